@@ -101,6 +101,7 @@ pub fn fit_force_coefficients(
             let misfits = misfits(&observations(&one.cuts, &rows));
             told.extend(misfits.iter().map(|m| warnings::of_misfit(trials, m)));
             let by_speed: Vec<&ForceGroup> = groups[first_group..].iter().collect();
+            told.extend(warnings::of_one_feed(trials, &one.cuts, &all));
             told.extend(warnings::of_fits(&all, &by_speed));
             told.extend(warnings::of_shape(trials, &all));
             told.extend(warnings::of_methods(&all, &by_speed, options));

@@ -44,11 +44,13 @@ pub use identify::{CfcResult, fit_force_coefficients};
 pub(crate) use made_tools::drill as test_drill;
 #[cfg(test)]
 pub(crate) use measured::cut_analysis::WRONG_SPEED;
+pub(crate) use measured::cut_analysis::contradicts_speed;
 pub use measured::cut_analysis::{Average, ChannelAnalysis, CutAnalysis, Notice, Trace, TurnAverage};
 pub use measured::faults::repair_record;
 #[cfg(test)]
 pub(crate) use measured::in_step::OTHER_SPEED;
 pub use measured::in_step::{RecordReading, analyse_in_step};
 pub use measured::record::analyse_cut;
+pub(crate) use plausibility::USUAL;
 pub(crate) use warnings::of_notices;
 pub use warnings::speed_text;

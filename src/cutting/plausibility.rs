@@ -66,7 +66,7 @@ fn specific(trials: &CuttingTrials, cut: &CutAnalysis) -> Option<Specific> {
 const ANY_MATERIAL: [f64; 2] = [10.0, 30_000.0];
 
 /// Where most materials lie, N/mm².
-const USUAL: [f64; 2] = [100.0, 10_000.0];
+pub(crate) const USUAL: [f64; 2] = [100.0, 10_000.0];
 
 /// Words in a material's name, and its specific cutting energy in N/mm²: Kienzle's unit forces (steel 1500–2500, cast iron
 /// 800–1500, aluminium 400–900, titanium 1300–1700, nickel alloys 2400–3500, plastics 50–200) for chips of 0.01 to 0.3 mm.

@@ -9,7 +9,7 @@ use crate::cutting::fit::group::{Coefficient, ForceGroup, distinct};
 use crate::cutting::fit::outlier::CutMisfit;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::NO_AIR;
-use crate::cutting::measured::cut_analysis::{CutAnalysis, Notice, WRONG_SPEED};
+use crate::cutting::measured::cut_analysis::{CutAnalysis, NOTHING_REPEATS, Notice, WRONG_SPEED};
 use crate::data::Process;
 
 /// Notices of all records, one sentence a kind.
@@ -32,14 +32,16 @@ pub(crate) fn of_notices(notices: &[(String, Notice)], cuts: usize) -> Vec<Strin
 }
 
 fn sentences<'a>(notices: impl Iterator<Item = (&'a str, &'a Notice)>, cuts: usize) -> Vec<String> {
-    let mut by_kind: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+    // What makes all the rest meaningless comes first.
+    let mut by_kind: BTreeMap<(bool, &str), Vec<(&str, &str)>> = BTreeMap::new();
     for (id, notice) in notices {
-        by_kind.entry(notice.kind).or_default().push((id, &notice.detail));
+        let key = (notice.kind != NOTHING_REPEATS, notice.kind);
+        by_kind.entry(key).or_default().push((id, &notice.detail));
     }
-    let sentence = |(kind, told): (&str, Vec<(&str, &str)>)| {
+    let sentence = |((_, kind), told): ((bool, &str), Vec<(&str, &str)>)| {
         let mut ids: Vec<&str> = told.iter().map(|(id, _)| *id).collect();
         ids.dedup();
-        if kind == NO_AIR && ids.len() == cuts {
+        if [NO_AIR, NOTHING_REPEATS].contains(&kind) && ids.len() == cuts {
             return format!("all cuts: {kind}");
         }
         let one = |(id, detail): &(&str, &str)| match *detail {
@@ -77,10 +79,33 @@ fn common_speed_error(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Option<St
     } else {
         String::new()
     };
+    let first = milled().next()?;
     Some(format!(
         "all cuts: the tooth-passing line stands at {factor:.3} times the frequency that spindle_rpm and {teeth} teeth give: \
-         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is"
+         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is (cut {}: {:.0} rpm and not {}); \
+         the coefficients rest on it",
+        first.id,
+        first.spindle_rpm * factor,
+        first.spindle_rpm
     ))
+}
+
+/// Milled with one feed: what tells cutting from edge coefficients then, where anything does.
+pub(super) fn of_one_feed(trials: &CuttingTrials, cuts: &[&CutAnalysis], all: &ForceGroup) -> Option<String> {
+    let feeds = distinct(cuts.iter().map(|c| c.feed_mm));
+    let [feed] = feeds.as_slice() else { return None };
+    // Where nothing tells them apart, another warning says it.
+    let is_told = all.inseparable.is_empty() && all.process == Process::Milling;
+    let by = match trials.tool.corner_radius_mm > 0.0 {
+        true => "the rounded edge, where the chip is thinner",
+        false => "the immersion angles",
+    };
+    is_told.then(|| {
+        format!(
+            "all cuts have one feed per tooth ({feed} mm): cutting and edge coefficients are told apart by {by} alone, and so only as well \
+             as the tool and the engagement are known; cut a second feed, half or twice as large"
+        )
+    })
 }
 
 /// Cells of a speed × feed plan that stayed empty, where there clearly was a plan.

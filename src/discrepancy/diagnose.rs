@@ -344,7 +344,9 @@ impl<'a, S: Study> Engine<'a, S> {
             _ => None,
         };
         let mut decision = verdict::decide(&candidates, &credible, &baseline, set, evidence.scale);
-        let too_little_data = self.too_little_data();
+        let too_little_data = self
+            .too_little_data()
+            .or_else(|| explains_nothing(baseline.residual.nrms, baseline.reduced_chi2));
         if too_little_data.is_some() {
             decision = verdict::Decision {
                 verdict: DiagnosisVerdict::Unknown,
@@ -917,5 +919,35 @@ impl<'a, S: Study> Engine<'a, S> {
             theta: fit.theta,
             cost: fit.cost,
         })
+    }
+}
+
+/// Error over the signal from which on a model explains nothing of it.
+const EXPLAINS_NOTHING_NRMS: f64 = 0.95;
+/// Misfit up to which what is left may be noise.
+const LIKE_NOISE: f64 = 1.5;
+
+/// Why there is nothing to judge where the signal itself is noise; `None` where there is.
+fn explains_nothing(nrms: f64, reduced_chi2: f64) -> Option<String> {
+    (nrms > EXPLAINS_NOTHING_NRMS && reduced_chi2 < LIKE_NOISE).then(|| {
+        format!(
+            "the model's error is as large as the signal ({:.0} %) and no larger than the noise, so that nothing in the data is told \
+             from noise: check columns, sampling rates and speeds in campaign.toml (column, rate_hz, spindle_rpm), and that there was \
+             something to measure",
+            100.0 * nrms
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::explains_nothing;
+
+    #[test]
+    fn noise_is_not_called_a_complete_model() {
+        assert!(explains_nothing(1.0, 1.02).is_some_and(|why| why.contains("rate_hz")));
+        // A faint signal that the model explains in part, and a wrong model of a clear one.
+        assert_eq!(explains_nothing(0.8, 1.0), None);
+        assert_eq!(explains_nothing(1.0, 40.0), None);
     }
 }

@@ -390,6 +390,79 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, Plain
 /// # Errors
 /// The operating system's.
 pub fn timeless_forces(path: &Path) -> Result<Vec<(&'static str, String)>> {
+    Ok(forces_of(&timeless_records(path)?))
+}
+
+fn forces_of(records: &[TimeRecord]) -> Vec<(&'static str, String)> {
+    let of = |channel: &Channel| {
+        let what = match channel.role {
+            ChannelRole::ForceX => "fx",
+            ChannelRole::ForceY => "fy",
+            ChannelRole::ForceZ => "fz",
+            ChannelRole::TorqueZ => "mz",
+            ChannelRole::Other => return None,
+        };
+        Some((what, channel.name.clone()))
+    };
+    let first = records.first();
+    first.map_or_else(Vec::new, |record| record.channels.iter().filter_map(of).collect())
+}
+
+/// Forces of one cut in a file that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
+/// cut), and what each is and how it is called.
+pub type TimelessCut = (String, Vec<(&'static str, String)>);
+
+/// The cuts in a file that says neither times nor a sampling rate, told apart by what stands beside Fx, Fy, Fz, Mz in the names of
+/// the channels (`Fx_R_1`, `Fy_R_1`: `R_1`); empty where the file holds no forces, or says its times.
+///
+/// # Errors
+/// The operating system's.
+pub fn timeless_cuts(path: &Path) -> Result<Vec<TimelessCut>> {
+    let records = timeless_records(path)?;
+    let named = |channel: &Channel| -> Option<(&'static str, String, String)> {
+        let name = channel.name.as_str();
+        let lower = name.to_ascii_lowercase();
+        let mut all = ["fx", "fy", "fz", "mz"].into_iter();
+        let (what, at) = all.find_map(|what| Some((what, lower.find(what)?)))?;
+        let beside = format!("{}{}", &name[..at], &name[at + 2..]);
+        let id = beside.trim_matches(|c: char| !c.is_alphanumeric());
+        Some((what, name.to_string(), id.to_string()))
+    };
+    let found: Vec<_> = records
+        .iter()
+        .flat_map(|r| &r.channels)
+        .filter_map(named)
+        .collect();
+    let is_one_cut = found
+        .iter()
+        .all(|(what, ..)| found.iter().filter(|(other, ..)| what == other).count() == 1);
+    // Units and the like stand beside the names of one cut, too.
+    if is_one_cut {
+        let own = forces_of(&records);
+        let some = (!own.is_empty()).then(|| (String::new(), own));
+        return Ok(some.into_iter().collect());
+    }
+    let mut cuts: Vec<TimelessCut> = Vec::new();
+    for (what, name, id) in found {
+        let place = cuts
+            .iter()
+            .position(|(known, _)| *known == id)
+            .unwrap_or_else(|| {
+                cuts.push((id, Vec::new()));
+                cuts.len() - 1
+            });
+        let own = &mut cuts[place].1;
+        if own.iter().all(|(known, _)| *known != what) {
+            own.push((what, name));
+        }
+    }
+    // A force without another beside it is no dynamometer's record.
+    cuts.retain(|(_, channels)| channels.len() > 1);
+    Ok(cuts)
+}
+
+/// The records of a file that says neither times nor a sampling rate, at any rate; empty where it says its times.
+fn timeless_records(path: &Path) -> Result<Vec<TimeRecord>> {
     /// Any will do.
     const RATE_HZ: f64 = 1000.0;
     /// A shorter table is a list of results.
@@ -413,20 +486,9 @@ pub fn timeless_forces(path: &Path) -> Result<Vec<(&'static str, String)>> {
             None => return Ok(Vec::new()),
         }
     };
-    let of = |channel: &Channel| {
-        let what = match channel.role {
-            ChannelRole::ForceX => "fx",
-            ChannelRole::ForceY => "fy",
-            ChannelRole::ForceZ => "fz",
-            ChannelRole::TorqueZ => "mz",
-            ChannelRole::Other => return None,
-        };
-        Some((what, channel.name.clone()))
-    };
-    let first = times
-        .ok()
-        .and_then(|times| times.into_iter().find(|t| t.len() >= SHORTEST));
-    Ok(first.map_or_else(Vec::new, |record| record.channels.iter().filter_map(of).collect()))
+    let mut records = times.unwrap_or_default();
+    records.retain(|record| record.len() >= SHORTEST);
+    Ok(records)
 }
 
 /// A table of text that has no names, or no time: columns are named as the rules name them.
@@ -624,5 +686,28 @@ mod tests {
         assert_eq!(forces("b.csv", useless.as_bytes()).0.len(), 2);
         assert!(forces("c.csv", b"time_s,fx\n0,1\n1,2\n2,3\n3,4\n").0.is_empty());
         assert!(forces("d.csv", b"1,2\n2,1\n3,3\n4,3\n").0.is_empty());
+    }
+
+    #[test]
+    fn several_cuts_in_one_file_are_told_apart_by_the_names_of_their_channels() {
+        let folder = tempfile::tempdir().unwrap();
+        let ramp: Vec<f64> = (0..600).map(|i| f64::from(i % 7)).collect();
+        let cuts = |names: &[&str]| {
+            let path = folder.path().join("cuts.mat");
+            let arrays: Vec<_> = names
+                .iter()
+                .map(|n| crate::ingest::MatArray::column(n, &ramp))
+                .collect();
+            std::fs::write(&path, crate::ingest::mat5_bytes(&arrays)).unwrap();
+            timeless_cuts(&path).unwrap()
+        };
+        let found = cuts(&["Fx_R_1", "Fy_R_1", "Fz_R_1", "Fx_R_2", "Fy_R_2"]);
+        let of = |id: &str| found.iter().find(|(own, _)| own == id).map(|(_, c)| c.clone());
+        assert_eq!(found.len(), 2);
+        let second = [("fx", "Fx_R_2".to_owned()), ("fy", "Fy_R_2".to_owned())];
+        assert_eq!(of("R_2").unwrap(), second);
+        assert_eq!(of("R_1").unwrap().len(), 3);
+        let one = cuts(&["Fx", "Fy", "Fz"]);
+        assert_eq!((one.len(), one[0].0.as_str(), one[0].1.len()), (1, "", 3));
     }
 }

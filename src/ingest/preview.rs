@@ -8,7 +8,7 @@ use super::units;
 use crate::ingest::tables::table::Header;
 use crate::{Error, Result};
 
-/// Rows that are looked at.
+/// Rows that are looked at; [`PlainColumn::how_far`] tells it.
 const ROWS: usize = 2000;
 /// Bytes read of a file to see them.
 const START: u64 = 1 << 20;
@@ -47,6 +47,14 @@ impl PlainColumn {
             step: even().filter(|_| is_first),
             rises: values.is_sorted_by(|a, b| a < b),
             rows: values.len(),
+        }
+    }
+
+    /// That only the file's start was looked at, where it is longer: a cut that begins later is not in the range.
+    pub fn how_far(&self) -> &'static str {
+        match self.rows >= ROWS {
+            true => " in the first 2000 rows",
+            false => "",
         }
     }
 
@@ -133,9 +141,10 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
         }
     }
     let what = format!(
-        "{} columns of numbers without names ({})",
+        "{} columns of numbers without names ({}{})",
         header.columns,
-        seen.join("; ")
+        seen.join("; "),
+        columns.first().map_or("", PlainColumn::how_far)
     );
     let remedy = format!(
         "put a line of column names on top (frequency_hz,re,im for an FRF; time_s,force_n,acc_m_per_s2 for a tap test; \

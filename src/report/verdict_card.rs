@@ -104,7 +104,7 @@ fn answer<D: Modelled>(
             nothing(&mut card, &d.baseline, added, data);
         }
         _ if d.too_little_data.is_some() => {
-            card.headline = "No verdict: too few data for one".into();
+            card.headline = "No verdict: the data do not suffice for one".into();
             card.explanation = sentence(d.too_little_data.as_deref().unwrap_or_default());
         }
         _ => {

@@ -4,8 +4,8 @@
 use rayon::prelude::*;
 
 use crate::campaign::Process;
-use crate::cutting::ForceGroup;
-use crate::identify::forces::cutting_study::calibrate_cutting;
+use crate::cutting::{ForceGroup, USUAL};
+use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, calibrate_cutting, cutting_nrms};
 use crate::identify::{CuttingData, CuttingModel};
 use crate::text::figures;
 
@@ -20,6 +20,8 @@ struct Reading {
 struct Trial {
     reading: Reading,
     chi2: f64,
+    /// Error over the signal.
+    nrms: f64,
     /// Ktc, Krc, Kac.
     cutting: [f64; 3],
 }
@@ -48,30 +50,30 @@ pub fn wrong_channels(data: &CuttingData, groups: &[ForceGroup]) -> Option<Strin
     // A hair beyond the bounds may be noise.
     let doubtful = (0..3).any(|j| cutting[j] < -noise(j) && cutting[j] < -0.02 * cutting[0].abs())
         || cutting[1] > 1.5 * cutting[0];
-    if data.process != Process::Milling || !doubtful {
+    if data.process != Process::Milling || !doubtful || data.speed_is_contradicted {
         return None;
     }
     let step = data.cuts.len().div_ceil(CUTS).max(1);
     let some = data.filtered(|i| i % step == 0);
     let now = try_reading(&some, Reading::AS_RECORDED)?;
+    // The same waveform seen from another side is another set of coefficients: then only these speak. One channel scaled anew is
+    // another waveform, and has to fit markedly better.
+    let speaks = |t: &Trial| {
+        let from_another_side = !now.is_physical() && !t.reading.is_scaled() && t.chi2 < ALIKE * now.chi2;
+        t.is_physical() && t.nrms < EXPLAINS_NRMS && (t.chi2 < MUCH_BETTER * now.chi2 || from_another_side)
+    };
     let trials: Vec<Trial> = Reading::others()
         .into_par_iter()
         .filter_map(|reading| try_reading(&some, reading))
-        .filter(Trial::is_physical)
+        .filter(speaks)
         .collect();
     let least = trials.iter().map(|t| t.chi2).fold(f64::INFINITY, f64::min);
-    // The same waveform seen from another side is another set of coefficients: then only these speak.
-    let enough = least < MUCH_BETTER * now.chi2 || (!now.is_physical() && least < ALIKE * now.chi2);
-    let best = trials
-        .iter()
-        .filter(|t| t.chi2 <= ALIKE * least)
-        .min_by(|a, b| {
-            a.reading
-                .changes()
-                .cmp(&b.reading.changes())
-                .then(a.chi2.total_cmp(&b.chi2))
-        })
-        .filter(|_| enough)?;
+    let best = trials.iter().filter(|t| t.chi2 <= ALIKE * least).min_by(|a, b| {
+        a.reading
+            .changes()
+            .cmp(&b.reading.changes())
+            .then(a.chi2.total_cmp(&b.chi2))
+    })?;
     let [ktc, krc, kac] = best.cutting.map(|k| figures(k, 3));
     Some(format!(
         "{}: read so, the waveforms leave {} times the variance of the noise instead of {}, and Ktc, Krc, Kac are {ktc}, {krc}, {kac} \
@@ -85,7 +87,8 @@ pub fn wrong_channels(data: &CuttingData, groups: &[ForceGroup]) -> Option<Strin
 impl Trial {
     fn is_physical(&self) -> bool {
         let [ktc, krc, kac] = self.cutting;
-        ktc > 0.0 && krc > 0.0 && krc < 1.5 * ktc && kac > -0.02 * ktc
+        let [low, high] = USUAL;
+        (low..high).contains(&ktc) && krc > 0.0 && krc < 1.5 * ktc && kac > -0.02 * ktc
     }
 }
 
@@ -104,6 +107,7 @@ fn try_reading(data: &CuttingData, reading: Reading) -> Option<Trial> {
     Some(Trial {
         reading,
         chi2: calibration.reduced_chi2,
+        nrms: cutting_nrms(&model, &own, &calibration.theta).ok()?,
         cutting: [
             find("ktc_n_per_mm2")?,
             find("krc_n_per_mm2")?,
@@ -144,6 +148,10 @@ impl Reading {
     fn changes(&self) -> usize {
         let moved = (0..3).filter(|i| self.from[*i] != *i).count();
         moved + self.factor.iter().filter(|f| **f != 1.0).count()
+    }
+
+    fn is_scaled(&self) -> bool {
+        self.factor.iter().any(|f| f.abs() != 1.0)
     }
 
     fn describe(&self) -> String {

@@ -4,7 +4,7 @@ use crate::analysis::forces::force_records::ForceRecords;
 use crate::analysis::grown::with_revision;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process};
-use crate::cutting::of_notices;
+use crate::cutting::{contradicts_speed, of_notices};
 use crate::effects::Registry;
 use crate::identify::forces::cutting_data::processes;
 use crate::identify::model_history::Side;
@@ -117,6 +117,15 @@ impl CuttingData {
                 warnings.first().map_or("", String::as_str)
             )));
         }
+        let contradicting = cuts
+            .iter()
+            .filter(|cut| {
+                noticed
+                    .iter()
+                    .any(|(id, n)| *id == cut.id && contradicts_speed(n))
+            })
+            .count();
+        let speed_is_contradicted = 2 * contradicting >= cuts.len();
         warnings.extend(of_notices(&noticed, indices.len()));
         let teeth = campaign.tool.as_ref().map_or(1, |t| t.teeth);
         let data = CuttingData::new(process, teeth, campaign.dynamometer.tool_from_dyno, cuts);
@@ -124,6 +133,10 @@ impl CuttingData {
             Error::Input(error) => error.file(campaign.dir.join("campaign.toml")).into(),
             other => other,
         })?;
-        Ok(CuttingData { warnings, ..data })
+        Ok(CuttingData {
+            warnings,
+            speed_is_contradicted,
+            ..data
+        })
     }
 }

@@ -160,6 +160,8 @@ mod tests {
         CUT_S, MadeCut, TRUTH, write_campaign, write_campaign_of,
     };
     use crate::cutting::{OTHER_SPEED, WRONG_SPEED, analyse_cut};
+    use crate::data::Process;
+    use crate::identify::CuttingData;
     use std::f64::consts::TAU;
 
     /// Largest relative error of a cutting coefficient.
@@ -219,6 +221,39 @@ mod tests {
                     .any(|w| w.contains(OTHER_SPEED) && w.contains("cut01.csv"))
             );
         }
+    }
+
+    #[test]
+    fn from_a_speed_that_is_far_off_nothing_is_concluded() {
+        let told = |speed: &dyn Fn(f64) -> f64| {
+            let dir = tempfile::tempdir().unwrap();
+            let cuts: Vec<MadeCut> = [0.05, 0.1, 0.16]
+                .map(|feed_mm| MadeCut {
+                    rpm: 1200.0,
+                    feed_mm,
+                    speed,
+                })
+                .into();
+            let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
+            let bench = Workbench::new(&campaign);
+            let warnings = identify_forces(&bench, CfcOptions::default()).unwrap().warnings;
+            let data = CuttingData::on(&bench, Process::Milling).unwrap();
+            (warnings, data.speed_is_contradicted)
+        };
+        let (warnings, contradicted) = told(&|_| 1.15);
+        assert!(contradicted);
+        assert!(
+            warnings
+                .iter()
+                .any(|w| w.contains("cut 01: 1380 rpm and not 1200")),
+            "{warnings:?}"
+        );
+        let (warnings, contradicted) = told(&|_| 1.0);
+        assert!(!contradicted, "{warnings:?}");
+        assert!(
+            !warnings.iter().any(|w| w.contains("rpm and not")),
+            "{warnings:?}"
+        );
     }
 
     #[test]

@@ -26,7 +26,10 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
             making.add(unit, &[(Some("s"), format!("the column {shows}").as_str())])?;
         } else {
             let place = Entry::new("column", Kind::Whole, "which column it is, from 1", "1");
-            let why = format!("signals taken as fx, fy, fz, mz in their order; this one: {shows}");
+            let why = format!(
+                "signals taken as fx, fy, fz, mz in their order; this one: {shows}{}",
+                column.how_far()
+            );
             making.add(place, &[(Some(at.as_str()), why.as_str())])?;
             let unit = Entry::new(
                 "unit",

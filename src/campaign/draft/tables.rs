@@ -384,6 +384,16 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTabl
         let depth = known("axial_depth_mm").map(|ap| (ap.to_string(), format!("ap {ap} mm")));
         let work = diameter.map(|d| (d.clone(), format!("D {d} mm")));
         for entry in entries {
+            // What was given for the tool is the user's word, and of a lathe's tool it can be the workpiece's only.
+            let given = answers.get("tool", "", DIAMETER).filter(|_| {
+                entry.key == DIAMETER && known(DIAMETER).is_none() && process.as_deref() == Some("turning")
+            });
+            // What is no number is refused where it is read.
+            let given = given.filter(|text| text.parse::<f64>().is_ok());
+            if let Some(given) = given {
+                making.known(entry, given);
+                continue;
+            }
             let [header, name] = said(entry.key);
             let derived = match entry.key {
                 "feed_per_tooth_mm" => feeds.per_tooth.as_ref(),

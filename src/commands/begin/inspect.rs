@@ -9,7 +9,7 @@ use crate::commands::{Outcome, next_step};
 use crate::ingest::{
     self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
 };
-use crate::{InputError, Result};
+use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
 pub struct InspectArgs {
@@ -95,7 +95,10 @@ struct Row {
 }
 
 fn inspect(path: &Path) -> Result<Seen> {
-    let survey = ingest::survey(path)?;
+    let survey = ingest::survey(path).map_err(|error| match error {
+        Error::Input(error) => without_times(path, *error).into(),
+        other => other,
+    })?;
     let file = survey.file;
     let contents = &file.contents;
     let is_force = |record: &TimeRecord| record.channels.iter().any(|c| c.role != ChannelRole::Other);
@@ -137,6 +140,76 @@ fn inspect(path: &Path) -> Result<Seen> {
         rows,
         warnings,
     })
+}
+
+/// Cuts of a file whose lines are shown; those of the others are alike.
+const SHOWN_CUTS: usize = 2;
+
+/// What to tell of a file that was not understood: where forces without times are all that is in it, which they are and the lines
+/// that say the rest; else `error`, as it is.
+fn without_times(path: &Path, error: InputError) -> InputError {
+    let cuts = ingest::timeless_cuts(path).unwrap_or_default();
+    let names = |cuts: &[ingest::TimelessCut]| {
+        let all: Vec<&str> = cuts
+            .iter()
+            .flat_map(|(_, c)| c.iter().map(|(_, name)| name.as_str()))
+            .collect();
+        all.join(", ")
+    };
+    let channels = |cut: Option<&str>, channels: &[(&'static str, String)]| -> String {
+        let each = channels.iter().enumerate().map(|(i, (what, name))| {
+            let of_cut = cut.map_or(String::new(), |id| {
+                format!("\nunit = \"N\"\nrate_hz = 10000.0\ncut = \"{id}\"")
+            });
+            // Of one table all columns have one rate.
+            let rate = if cut.is_none() && i == 0 {
+                "\nrate_hz = 10000.0"
+            } else {
+                ""
+            };
+            format!("\n[[channel]]\nname = \"{what}\"\nin_file = \"{name}\"{rate}{of_cut}")
+        });
+        each.collect()
+    };
+    match cuts.as_slice() {
+        [] => error,
+        [(_, own)] => InputError::new(format!(
+            "forces ({}), and neither times nor a sampling rate",
+            names(&cuts)
+        ))
+        .file(path)
+        .remedy(format!(
+            "say how fast it was sampled: `lobestone init FOLDER --rate-hz 10000`, or in campaign.toml{}",
+            channels(None, own)
+        )),
+        several => {
+            let file = path
+                .file_name()
+                .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+            let lines: String = several
+                .iter()
+                .take(SHOWN_CUTS)
+                .map(|(id, own)| {
+                    format!(
+                        "\n[[cut]]\nid = \"{id}\"\nfile = \"{file}\"\nprocess = \"milling\"\nspindle_rpm = # fill in{}",
+                        channels(Some(id), own)
+                    )
+                })
+                .collect();
+            let ids: Vec<&str> = several.iter().map(|(id, _)| id.as_str()).collect();
+            InputError::new(format!(
+                "forces of {} cuts ({}), and neither times nor a sampling rate: {}",
+                several.len(),
+                ids.join(", "),
+                names(several)
+            ))
+            .file(path)
+            .remedy(format!(
+                "say in campaign.toml which channels are those of which cut, their unit and how fast they were sampled, for each cut such \
+                 as{lines}"
+            ))
+        }
+    }
 }
 
 impl Seen {

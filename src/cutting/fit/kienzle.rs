@@ -174,11 +174,14 @@ fn fit_both(
             ..o.clone()
         })
         .collect();
+    let components: Vec<KienzleComponent> = (0..names.len())
+        .map(|j| component(names[j], j, &law, &best))
+        .collect();
+    // What a law without any exponent says of another feed is nothing.
+    let is_determined = components.iter().any(|c| c.m.is_some());
     Some(KienzleFit {
         process,
-        components: (0..names.len())
-            .map(|j| component(names[j], j, &law, &best))
-            .collect(),
+        components,
         converged: best.converged,
         r2: r2(&as_one, &[1.0]),
         delta_bic,
@@ -186,8 +189,8 @@ fn fit_both(
         p_kienzle,
         preferred,
         telling: match preferred {
-            None => telling_feed(tool, &law, observations, geometries, &linear, &best),
-            Some(_) => None,
+            None if is_determined => telling_feed(tool, &law, observations, geometries, &linear, &best),
+            _ => None,
         },
     })
 }
@@ -605,7 +608,12 @@ mod tests {
 
         let one = noisy(&exact(&[0.1], &[Immersion::SLOT], &kienzle_law), 0.3, 4);
         assert!(one.components.iter().all(|c| c.m.is_none() && c.k1_1.is_none()));
-        assert_eq!((one.preferred, one.p_kienzle), (None, None));
+        assert_eq!((one.preferred, one.p_kienzle, one.telling), (None, None, None));
+        assert!(
+            one.reading().contains("cut at least four feeds"),
+            "{}",
+            one.reading()
+        );
     }
 
     #[test]

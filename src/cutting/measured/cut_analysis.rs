@@ -106,6 +106,21 @@ pub struct TurnAverage {
 pub(crate) const WRONG_SPEED: &str = "coefficients rest on a wrong spindle speed or number of teeth: correct spindle_rpm \
      (and the feed per tooth that goes with it) or [tool] teeth";
 
+/// Notice of a record whose lines fit a multiple or a fraction of the stated speed only.
+pub(crate) const OTHER_MULTIPLE: &str = "the forces repeat as they would at a multiple or a fraction of the stated speed, and the \
+     coefficients rest on it: check spindle_rpm (and the feed per tooth that goes with it), [tool] teeth and the sampling rate (rate_hz \
+     or the file's times); where they are right, a resonance of the dynamometer lies on that line";
+/// Notice of a record that is noise at the orders of the turn.
+pub(crate) const NOTHING_REPEATS: &str = "nothing in these records repeats with the stated speed: the sampling rate, spindle_rpm or the \
+     columns are not what campaign.toml says (rate_hz, spindle_rpm, [[channel]] column), or the tool did not cut; coefficients from \
+     them mean nothing";
+
+/// Does the record contradict the stated speed, or show nothing that repeats with it? Then nothing that its waveform says about
+/// channels, axes or physics can be believed.
+pub(crate) fn contradicts_speed(notice: &Notice) -> bool {
+    [WRONG_SPEED, OTHER_MULTIPLE, NOTHING_REPEATS].contains(&notice.kind)
+}
+
 /// F_tool = A F_recorded, standard errors added in squares; torque is taken as recorded.
 pub(crate) fn in_tool_axes(
     tool_from_dyno: &[[f64; 3]; 3],

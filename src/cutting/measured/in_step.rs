@@ -98,6 +98,9 @@ fn followed(tool: &Tool, analysis: &CutAnalysis, record: &TimeRecord) -> Option<
 /// `force/cut03.csv: 1200 rpm stated, 1208.40 ± 0.05 found, falls by 2.0 ± 0.1 % over the cut`.
 fn in_words(track: &SpindleTrack, file: &str, stated_rpm: f64) -> String {
     let [_, droops, wanders] = track.told();
+    // A part in a million is a rounding error that happens to stand above its own.
+    let droops = droops && track.droop.abs() > 1e-6;
+    let wanders = wanders && track.wander > 1e-6;
     let percent =
         |value: f64, std: f64| format!("{} ± {} %", figures(100.0 * value, 2), figures(100.0 * std, 1));
     let mut text = format!(

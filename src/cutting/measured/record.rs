@@ -11,9 +11,9 @@ use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::{air_notices, believable_air};
 use crate::cutting::measured::average::average;
 use crate::cutting::measured::cut_analysis::{
-    ChannelAnalysis, CutAnalysis, Notice, Trace, WRONG_SPEED, in_tool_axes,
+    ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
-use crate::cutting::measured::teeth::{idle_tooth, tooth_back_mm};
+use crate::cutting::measured::teeth::{idle_tooth, one_tooth_alone, tooth_back_mm, tooth_passing_too_weak};
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
 use crate::signal::{
@@ -35,8 +35,10 @@ const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are
 const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow entry or exit, a depth that changes, or wear; look at \
      the record and give steady_s = [from, to]";
 const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
-     is as large as the feed per tooth, or [tool] teeth is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
+     is as large as the feed per tooth, or [tool] teeth or spindle_rpm is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
      coefficients come out low by its share";
+/// Unevenness over that of one tooth cutting alone that no error of the directions explains (power).
+const MORE_THAN_ONE_TOOTH: f64 = 2.0;
 const TOOTH_STANDS_BACK: &str = "one tooth cuts less than the others and the next one more, as no offset of the tool's axis makes it: \
      chipped, worn or set low, or the teeth stand at uneven angles; near the ends of the immersion it does not cut, so that the edge \
      coefficients come out low (tooth_radius_offset_mm or pitch_deg in [tool] take it into account)";
@@ -164,10 +166,17 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
         });
     }
     let tooth_line = match cut.geometry {
-        CutGeometry::Milling { .. } => usable
-            .iter()
-            .filter_map(|&(_, _, v)| tooth_line(&v[steady.clone()], rate, cut.spindle_rpm / 60.0, tool.teeth))
-            .max_by(|a, b| a.strongest_to_noise.total_cmp(&b.strongest_to_noise)),
+        CutGeometry::Milling { .. } => {
+            // A torque has another unit; it speaks where it is alone.
+            let forces = || usable.iter().filter(|c| c.0 != ForceAxis::Mz);
+            let alone = forces().next().is_none();
+            let own: Vec<&[f64]> = usable
+                .iter()
+                .filter(|c| alone || c.0 != ForceAxis::Mz)
+                .map(|c| &c.2[steady.clone()])
+                .collect();
+            tooth_line(&own, rate, cut.spindle_rpm / 60.0, tool.teeth)
+        }
         CutGeometry::Drilling { .. } => {
             duration_notice(cut, tool, &phases, rate, &mut notices);
             None
@@ -175,12 +184,14 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
         // One edge that never leaves the work: no line to judge the speed by.
         CutGeometry::Turning { .. } => None,
     };
-    teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
             detail: wrong_speed(&line, cut.spindle_rpm, tool.teeth.max(1)),
         });
+    } else {
+        // At a wrong speed the orders are no orders of the turn, and say nothing of the teeth.
+        teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
     }
     Ok(CutAnalysis {
         cut: cut_index,
@@ -243,6 +254,8 @@ fn wrong_speed(line: &ToothLine, spindle_rpm: f64, teeth: usize) -> String {
     let whole = as_teeth.round();
     let other_tool = if whole >= 1.0 && (as_teeth - whole).abs() < 0.01 * whole && whole != teeth as f64 {
         format!(", or the tool has {whole} teeth")
+    } else if (as_teeth / teeth as f64 - 0.5).abs() < 0.005 {
+        ", or it chatters so that every second tooth cuts alike".to_string()
     } else {
         String::new()
     };
@@ -396,6 +409,16 @@ fn unsteady_notice(
 /// Orders of a longer window are taken from its start.
 const MOST_SAMPLES: usize = 1 << 17;
 
+/// Are the orders of the turn no stronger than what lies between them? `over_noise`: their powers over those of their noise, which
+/// has one on average and is exponentially distributed.
+fn is_noise(over_noise: &[f64]) -> bool {
+    let count = over_noise.len() as f64;
+    let highest = over_noise.iter().copied().fold(0.0, f64::max);
+    // Noise exceeds either bound once in a thousand records.
+    let mean = over_noise.iter().sum::<f64>() / count;
+    count > 0.0 && highest < count.ln() + 7.0 && mean < 1.0 + 3.5 / count.sqrt()
+}
+
 #[allow(clippy::too_many_arguments)]
 fn teeth_notice(
     trials: &CuttingTrials,
@@ -417,16 +440,18 @@ fn teeth_notice(
     if highest_order(per_turn, milling.teeth) < milling.teeth {
         return;
     }
+    // Twice the tooth passing tells of half the true speed, where it was sampled.
+    let highest = highest_order(per_turn, 2 * milling.teeth);
     let of_channel = |axis: ForceAxis| -> Option<(signal::OrderSpectrum, f64, bool)> {
         let values = usable.iter().find(|c| c.0 == axis)?.2;
         let channel = channels.iter().find(|c| c.axis == axis)?;
-        let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, milling.teeth)?;
+        let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, highest)?;
         let has_zero = channel.drift.air_before || channel.drift.air_after;
         Some((spectrum, channel.mean.average.value, has_zero))
     };
     let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(of_channel);
-    let mut orders = [0, 1].map(|_| vec![Complex64::ZERO; milling.teeth]);
-    let mut variance = [0, 1].map(|_| vec![0.0; milling.teeth]);
+    let mut orders = [0, 1].map(|_| vec![Complex64::ZERO; highest]);
+    let mut variance = [0, 1].map(|_| vec![0.0; highest]);
     let (mut mean, mut zero_is_known) = ([0.0; 2], true);
     for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
         for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
@@ -443,14 +468,71 @@ fn teeth_notice(
             zero_is_known &= has_zero;
         }
     }
-    if let Some(part) = idle_tooth(&milling, [&orders[0], &orders[1]], mean, zero_is_known) {
+    let over_noise = recorded.iter().flatten().flat_map(|(own, ..)| {
+        let each = own.coefficient.iter().zip(&own.std);
+        each.map(|(c, std)| c.norm_sqr() / (std * std))
+    });
+    if is_noise(&over_noise.collect::<Vec<f64>>()) {
         notices.push(Notice {
-            kind: IDLE_TOOTH,
-            detail: format!("{:.0} % of what a missing tooth makes", 100.0 * part),
+            kind: NOTHING_REPEATS,
+            detail: String::new(),
         });
         return;
     }
     let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
+    if let Some(slow) = tooth_passing_too_weak(&milling, [&orders[0], &orders[1]], [&std[0], &std[1]]) {
+        notices.push(Notice {
+            kind: OTHER_MULTIPLE,
+            detail: format!(
+                "the line at twice the tooth-passing frequency of {} rpm × {} teeth is {} times as strong as that at the frequency \
+                 itself, and a cut of this immersion makes it {} times at most: as if the spindle ran at {} rpm",
+                cut.spindle_rpm,
+                milling.teeth,
+                figures(slow.measured, 2),
+                figures(slow.at_most, 2),
+                2.0 * cut.spindle_rpm
+            ),
+        });
+        return;
+    }
+    if let Some(part) = idle_tooth(&milling, [&orders[0], &orders[1]], mean, zero_is_known) {
+        let n = milling.teeth as f64;
+        let strongest = (1..milling.teeth)
+            .max_by(|a, b| {
+                let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
+                power(*a).total_cmp(&power(*b))
+            })
+            .unwrap_or(1);
+        let stands_out = [0, 1]
+            .map(|a| orders[a][strongest - 1].norm_sqr())
+            .iter()
+            .sum::<f64>()
+            > 36.0
+                * [0, 1]
+                    .map(|a: usize| std[a][strongest - 1].powi(2))
+                    .iter()
+                    .sum::<f64>();
+        let notice = if stands_out && part > MORE_THAN_ONE_TOOTH * one_tooth_alone(milling.teeth) {
+            Notice {
+                kind: OTHER_MULTIPLE,
+                detail: format!(
+                    "the line at {strongest} times {} rpm is stronger against that at {} times than one single cutting tooth of {} \
+                     would make it: as if the spindle ran at {} rpm",
+                    cut.spindle_rpm,
+                    milling.teeth,
+                    milling.teeth,
+                    figures(cut.spindle_rpm * strongest as f64 / n, 4)
+                ),
+            }
+        } else {
+            Notice {
+                kind: IDLE_TOOTH,
+                detail: format!("{:.0} % of what a missing tooth makes", 100.0 * part),
+            }
+        };
+        notices.push(notice);
+        return;
+    }
     let back = tooth_back_mm(
         &milling,
         [&orders[0], &orders[1]],
@@ -512,4 +594,37 @@ fn trace(values: &[f64], record: &TimeRecord) -> Trace {
             .push(part.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     }
     trace
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    /// Orders of `turns` turns of noise, with a line of `line` N (noise: 20 N) at order 4, over their noise.
+    fn over_noise(seed: u64, turns: usize, line: f64) -> Vec<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let samples: Vec<f64> = (0..turns * 250)
+            .map(|i| {
+                let angle = std::f64::consts::TAU * 4.0 * i as f64 / 250.0;
+                20.0 * crate::statistics::nearly_normal(&mut random) + line * angle.sin()
+            })
+            .collect();
+        let spectrum = signal::order_spectrum(&samples, 5000.0, 250.0, 8).unwrap();
+        let each = spectrum.coefficient.iter().zip(&spectrum.std);
+        each.map(|(c, std)| c.norm_sqr() / (std * std)).collect()
+    }
+
+    #[test]
+    fn noise_repeats_with_no_turn_and_a_line_in_it_does() {
+        let of_noise = (0..200)
+            .filter(|seed| is_noise(&over_noise(*seed, 60, 0.0)))
+            .count();
+        assert!(of_noise >= 196, "{of_noise} of 200");
+        for seed in 0..50 {
+            assert!(!is_noise(&over_noise(seed, 60, 5.0)), "{seed}");
+        }
+        assert!(!is_noise(&[]));
+    }
 }

@@ -74,6 +74,70 @@ pub(crate) fn idle_tooth(
     (told && all.is_finite()).then_some(all / missing)
 }
 
+/// What [`idle_tooth`] finds where one of the teeth cuts all and the others nothing, which is as uneven as teeth can cut: then
+/// a = N, 0, 0, …, and the mean square deviation is N − 1 against 2/N.
+pub(crate) fn one_tooth_alone(teeth: usize) -> f64 {
+    let n = teeth as f64;
+    0.5 * n * (n - 1.0)
+}
+
+/// The line at twice the tooth passing over that at the tooth passing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TwiceOverOnce {
+    pub measured: f64,
+    /// The largest that teeth cutting at this immersion make, whatever the metal.
+    pub at_most: f64,
+}
+
+/// Ratios of amplitudes further above what the immersion allows than this are no error of immersion or helix.
+const FAR_ABOVE: f64 = 3.0;
+/// Radial over tangential coefficient, and edge over cutting coefficient (mm), of metals.
+const RADIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+const EDGE_MM: [f64; 4] = [0.0, 0.02, 0.1, 1.0];
+
+/// Is the tooth passing too weak against its double for any cut of this immersion? So it is where the spindle ran at twice the
+/// stated speed: the double is the tooth passing then, and
+/// what stands at half of it, runout; then it is the strongest line, too (of a cutter with one tooth that cuts, the turn's is). `orders`, N, and their `std`: 1..=2N.
+pub(crate) fn tooth_passing_too_weak(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+) -> Option<TwiceOverOnce> {
+    let teeth = cut.teeth;
+    if teeth < 2 || orders.iter().any(|o| o.len() < 2 * teeth) {
+        return None;
+    }
+    let unit = cut.closed_form(2 * teeth);
+    let made = |k: usize, radial: f64, edge_mm: f64| -> f64 {
+        let axis = |a: usize| {
+            let chip = unit[0][a][k] + unit[1][a][k] * radial;
+            let edge = unit[3][a][k] + unit[4][a][k] * radial;
+            (chip + edge * edge_mm).norm_sqr()
+        };
+        axis(0) + axis(1)
+    };
+    let mut at_most = 0.0f64;
+    for radial in RADIAL {
+        for edge_mm in EDGE_MM {
+            let (once, twice) = (made(teeth, radial, edge_mm), made(2 * teeth, radial, edge_mm));
+            if !(once > 0.0) {
+                return None;
+            }
+            at_most = at_most.max((twice / once).sqrt());
+        }
+    }
+    let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
+    let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
+    let (once, twice) = (power(teeth), power(2 * teeth));
+    // What noise hides of the tooth passing is granted it.
+    let measured = (twice / (once + noise(teeth))).sqrt();
+    let is_strongest = (1..2 * teeth).all(|k| power(k) < twice);
+    let told = is_strongest
+        && twice > CERTAIN * CERTAIN * noise(2 * teeth)
+        && measured > FAR_ABOVE * at_most.max(WEAK);
+    (told && measured.is_finite()).then_some(TwiceOverOnce { measured, at_most })
+}
+
 /// A tooth that stands back by this part of the feed per tooth is worth a notice: from four teeth on, where an offset of the
 /// tool's axis is told apart from it, and below, where both look the same.
 const STANDS_BACK: f64 = 0.15;
@@ -290,5 +354,61 @@ mod tests {
         assert_eq!(back(&two, &[0.0, -0.02], 0.01), None);
         let three = cut(3, 0.0, 180.0);
         assert!(back(&three, &[0.0, -0.06, 0.0], 0.01).is_some());
+    }
+
+    /// Orders 1..=2N that even teeth leave when the speed is taken for `stated` times the true one, runout added as a part of the
+    /// tooth passing; and what is told of them. `stated`: 1 or ½.
+    fn too_weak(cut: &MillingCut, half_stated: bool, runout: f64) -> Option<TwiceOverOnce> {
+        let teeth = cut.teeth;
+        let unit = cut.closed_form(2 * teeth);
+        let coefficient = [900.0, 350.0, 0.0, 15.0, 18.0, 0.0];
+        let force = |axis: usize, k: usize| -> Complex64 {
+            let even: Complex64 = (0..6).map(|c| unit[c][axis][k] * coefficient[c]).sum();
+            let passing: Complex64 = (0..6).map(|c| unit[c][axis][teeth] * coefficient[c]).sum();
+            // An axis offset makes lines once per turn and beside the tooth passing.
+            let beside = [1, teeth - 1, teeth + 1].contains(&k);
+            even + if beside { passing * runout } else { Complex64::ZERO }
+        };
+        let orders: [Vec<Complex64>; 2] = [0, 1].map(|axis| {
+            let of = |k: usize| match half_stated {
+                false => force(axis, k),
+                true if k % 2 == 0 => force(axis, k / 2),
+                true => Complex64::ZERO,
+            };
+            (1..=2 * teeth).map(of).collect()
+        });
+        let std = vec![0.01; 2 * teeth];
+        tooth_passing_too_weak(cut, [&orders[0], &orders[1]], [&std, &std])
+    }
+
+    #[test]
+    fn half_the_true_speed_is_told_and_the_true_one_never() {
+        for (start, exit) in [(0.0, 180.0), (0.0, 70.0), (150.0, 180.0), (60.0, 120.0)] {
+            for teeth in [2, 3, 5] {
+                for runout in [0.0, 0.2] {
+                    let cut = cut(teeth, start, exit);
+                    let place = format!("{start}–{exit}: {teeth} teeth, runout {runout}");
+                    assert_eq!(too_weak(&cut, false, runout), None, "{place}");
+                    let found = too_weak(&cut, true, runout).unwrap_or_else(|| panic!("{place}"));
+                    assert!(found.measured > 3.0 * found.at_most, "{place}: {found:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_tooth_alone_is_the_most_uneven_cutter() {
+        for teeth in 2..=6 {
+            let cut = cut(teeth, 30.0, 110.0);
+            let mut share = vec![0.0; teeth];
+            share[0] = teeth as f64;
+            let found = told(&cut, &share, None).unwrap();
+            // The edge force, which is left out of the reckoning, comes once a turn instead of N times.
+            let most = one_tooth_alone(teeth);
+            assert!(
+                (0.6 * most..1.4 * most).contains(&found),
+                "{teeth}: {found} of {most}"
+            );
+        }
     }
 }

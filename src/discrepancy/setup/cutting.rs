@@ -14,8 +14,11 @@ use super::examine::SetupCheck;
 use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
+use crate::cutting::USUAL;
 use crate::data::Process;
-use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
+use crate::identify::forces::cutting_study::{
+    EXPLAINS_NRMS, NOISE_KNOWN_TO, calibrate_cutting, cutting_nrms, small_errors,
+};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
 /// Cuts that readings of the axes are tried on.
@@ -44,6 +47,10 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     }
     if data.process != Process::Milling {
         check.findings.extend(drilling_signs(data)?);
+        return Ok(check);
+    }
+    // At a wrong speed the waveform is none, and any reading of it fits as badly as any other.
+    if data.speed_is_contradicted {
         return Ok(check);
     }
     if let Some((finding, left)) = dyno_axes(data)? {
@@ -95,6 +102,8 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
 struct Trial {
     turn: Turn,
     chi2: f64,
+    /// Error over the signal.
+    nrms: f64,
     improbability: f64,
     cutting: [f64; 3],
 }
@@ -156,9 +165,11 @@ fn dyno_axes(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
         .filter_map(|turn| {
             let own = read(&some, turn);
             let calibration = fit(&own)?;
+            let model = CuttingModel::new(&own, true).ok()?;
             Some(Trial {
                 turn,
                 chi2: calibration.reduced_chi2,
+                nrms: cutting_nrms(&model, &own, &calibration.theta).ok()?,
                 improbability: improbability(&calibration),
                 cutting: ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"]
                     .map(|n| coefficient(&calibration, n)),
@@ -174,7 +185,10 @@ fn dyno_axes(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
     // As recorded counts among the rivals where it fits as well.
     let much_better = best.chi2 < MUCH_BETTER * now.reduced_chi2;
     let more_plausible = now_improbable > IMPLAUSIBLE && best.improbability + IMPLAUSIBLE < now_improbable;
-    let plausible = best.improbability < IMPLAUSIBLE;
+    let [low, high] = USUAL;
+    let plausible = best.improbability < IMPLAUSIBLE
+        && (low..high).contains(&best.cutting[0])
+        && best.nrms < EXPLAINS_NRMS;
     let alike_now = now.reduced_chi2 <= ALIKE * least;
     if !plausible || !(much_better || (alike_now && more_plausible)) {
         return Ok(None);

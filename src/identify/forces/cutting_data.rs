@@ -311,6 +311,9 @@ pub struct CuttingData {
     pub force_per_torque: f64,
     /// What effects need to know of the cuts.
     pub summary: CuttingSummary,
+    /// Half of the records or more contradict their stated speed, or repeat nothing with it: what their waveforms say of channels,
+    /// axes and physics is not to be believed.
+    pub speed_is_contradicted: bool,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,
 }
@@ -370,6 +373,7 @@ impl CuttingData {
             tool_from_dyno,
             dyno_from_tool: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
             summary,
+            speed_is_contradicted: false,
             warnings: Vec::new(),
         })
     }

@@ -149,6 +149,18 @@ pub fn calibrate_cutting(model: &CuttingModel, data: &CuttingData) -> Result<Cal
     Calibration::of_fit(&model.parameters, fit, data.value_count())
 }
 
+/// Error of `model` at `theta` over the signal, as [`Residual::nrms`].
+///
+/// # Errors
+/// Those of the model.
+pub fn cutting_nrms(model: &CuttingModel, data: &CuttingData, theta: &[f64]) -> Result<f64> {
+    let fits = CuttingProblem { model, data }.fits(theta)?;
+    Ok(sums(data, &fits).nrms())
+}
+
+/// A reading of the channels is proposed only where it leaves less than this of the signal: half of its power.
+pub const EXPLAINS_NRMS: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// Error on cuts left out in turn, refitted from `theta` on the others. `None` with fewer than two cuts.
 pub fn held_out_cuts(model: &CuttingModel, data: &CuttingData, theta: &[f64]) -> Result<Option<HeldOut>> {
     let study = CuttingStudy::new(data.clone());

@@ -95,7 +95,8 @@ fn one_axis(data: &CuttingData, cut: &CutData, fit: &CutFit, axis: ForceAxis) ->
     Some(waves)
 }
 
-/// The steady level: its mean (milling, where the rest is in the orders; turning) or its course over the hole (drilling).
+/// The steady level: its mean (milling, where the rest is in the orders) or its course over the hole or the turned length, block by
+/// block, as the misfit has it (of one turned cut every mean is fitted to the last digit).
 fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
     let n = cut.steady.len().max(1) as f64;
     let (mut error, mut signal, mut noise) = (Vec::new(), Vec::new(), 0.0);
@@ -121,12 +122,12 @@ fn level(process: Process, cut: &CutData, parts: &[Part]) -> WaveSums {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
     let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>() / n;
     match process {
-        Process::Milling | Process::Turning => WaveSums {
+        Process::Milling => WaveSums {
             error: mean(&error).powi(2),
             signal: mean(&signal).powi(2),
             noise: noise / n,
         },
-        Process::Drilling => WaveSums {
+        Process::Drilling | Process::Turning => WaveSums {
             error: square(&error),
             signal: square(&signal),
             noise,

@@ -97,12 +97,12 @@ pub(super) fn of_one_feed(trials: &CuttingTrials, cuts: &[&CutAnalysis], all: &F
     // Where nothing tells them apart, another warning says it.
     let is_told = all.inseparable.is_empty() && all.process == Process::Milling;
     let by = match trials.tool.corner_radius_mm > 0.0 {
-        true => "the rounded edge, where the chip is thinner",
-        false => "the immersion angles",
+        true => "the rounded edge alone, where the chip is thinner,",
+        false => "the immersion angles alone,",
     };
     is_told.then(|| {
         format!(
-            "all cuts have one feed per tooth ({feed} mm): cutting and edge coefficients are told apart by {by} alone, and so only as well \
+            "all cuts have one feed per tooth ({feed} mm): cutting and edge coefficients are told apart by {by} and so only as well \
              as the tool and the engagement are known; cut a second feed, half or twice as large"
         )
     })

@@ -923,13 +923,11 @@ impl<'a, S: Study> Engine<'a, S> {
 }
 
 /// Error over the signal from which on a model explains nothing of it.
-const EXPLAINS_NOTHING_NRMS: f64 = 0.95;
-/// Misfit up to which what is left may be noise.
-const LIKE_NOISE: f64 = 1.5;
+pub(crate) const EXPLAINS_NOTHING_NRMS: f64 = 0.95;
 
 /// Why there is nothing to judge where the signal itself is noise; `None` where there is.
 fn explains_nothing(nrms: f64, reduced_chi2: f64) -> Option<String> {
-    (nrms > EXPLAINS_NOTHING_NRMS && reduced_chi2 < LIKE_NOISE).then(|| {
+    (nrms > EXPLAINS_NOTHING_NRMS && verdict::is_noise(reduced_chi2)).then(|| {
         format!(
             "the model's error is as large as the signal ({:.0} %) and no larger than the noise, so that nothing in the data is told \
              from noise: check columns, sampling rates and speeds in campaign.toml (column, rate_hz, spindle_rpm), and that there was \

@@ -291,6 +291,7 @@ mod tests {
                     path: format!("force/{name}.txt"),
                     from_name: names::facts_of(name),
                     from_header: Default::default(),
+                    part: None,
                 })
                 .collect(),
             ..Scan::default()
@@ -330,6 +331,42 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("# fill in: joints_deg = …"), "{text}");
+    }
+
+    #[test]
+    fn the_cuts_of_one_file_are_written_with_their_channels() {
+        use crate::ingest::{MatArray, mat5_bytes};
+        let folder = tempfile::tempdir().unwrap();
+        let values: Vec<f64> = (0..600).map(|i| f64::from(i % 7)).collect();
+        let names = ["Fx_R_1", "Fy_R_1", "Fx_R_2", "Fy_R_2"];
+        let arrays: Vec<MatArray> = names.iter().map(|n| MatArray::column(n, &values)).collect();
+        std::fs::write(folder.path().join("all.mat"), mat5_bytes(&arrays)).unwrap();
+        let scan = super::super::scan::scan(folder.path()).unwrap();
+        assert!(scan.not_used.is_empty(), "{:?}", scan.not_used);
+        let mut answers = Answers::default();
+        let said = [("cut", "process", "milling"), ("channel", "rate_hz", "5000")];
+        said.iter()
+            .for_each(|(table, key, value)| answers.set(table, key, *value));
+        let draft = Draft::new("cell", &scan, &answers).unwrap();
+        let text = draft.toml();
+        for id in ["R_1", "R_2"] {
+            let cut = format!("[[cut]]\nid = \"{id}\"\nfile = \"all.mat\"");
+            assert!(text.contains(&cut), "{text}");
+            let channel = format!("name = \"fy\"\nin_file = \"Fy_{id}\"\ncut = \"{id}\"\nrate_hz = 5000");
+            assert!(text.contains(&channel), "{text}");
+        }
+        assert!(draft.missing().iter().all(|m| m.table != "channel"));
+    }
+
+    #[test]
+    fn a_turned_diameter_that_was_given_is_no_guess() {
+        let scan = scan_of(&[], &["cut01"]);
+        let mut answers = Answers::default();
+        answers.set("cut", "process", "turning");
+        answers.set("tool", "diameter_mm", "60");
+        let draft = Draft::new("lathe", &scan, &answers).unwrap();
+        assert!(draft.toml().contains("diameter_mm = 60"), "{}", draft.toml());
+        assert!(draft.guesses().iter().all(|g| g.key != "diameter_mm"));
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
+use super::found::FoundForce;
 use super::making::Making;
+use super::tables::cut_ids;
 use crate::Result;
 use crate::ingest::{PlainColumn, taken_for};
 
@@ -50,6 +52,29 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
             }
         }
         tables.push(making.table);
+    }
+    Ok(tables)
+}
+
+/// Sections for the channels of cuts that lie in one file: which of its arrays are those of which cut, and how fast they were
+/// sampled.
+pub(super) fn channels_of_cuts(forces: &[FoundForce], answers: &Answers) -> Result<Vec<DraftTable>> {
+    let mut tables = Vec::new();
+    for (force, id) in forces.iter().zip(cut_ids(forces)) {
+        for (what, called) in force.part.iter().flat_map(|(_, channels)| channels) {
+            let mut making = Making::new(answers, "channel", what, true);
+            making.fact("name", Kind::Text, what);
+            making.fact("in_file", Kind::Text, called);
+            making.fact("cut", Kind::Text, &id);
+            let rate = Entry::new(
+                "rate_hz",
+                Kind::Number,
+                "samples a second, Hz (the files do not say it)",
+                "10000.0",
+            );
+            making.add(rate, &[])?;
+            tables.push(making.table);
+        }
     }
     Ok(tables)
 }

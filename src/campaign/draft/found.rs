@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::names::Facts;
 use crate::data::Quantity;
-use crate::ingest::PlainColumn;
+use crate::ingest::{PlainColumn, TimelessCut};
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
 #[derive(Debug, Default, Clone)]
@@ -50,6 +50,8 @@ pub struct FoundForce {
     pub path: String,
     pub(crate) from_name: Facts,
     pub(crate) from_header: Facts,
+    /// Id and channels, where the file holds several cuts and this is one of them.
+    pub part: Option<TimelessCut>,
 }
 
 /// Name without folders and ending.

@@ -11,7 +11,9 @@ use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{ChannelRole, Quantity, RobotSpec};
-use crate::ingest::{PlainColumn, SIGNALS, plain_columns, sheet_text, survey, timeless_forces};
+use crate::ingest::{
+    PlainColumn, SIGNALS, plain_columns, sheet_text, survey, timeless_cuts, timeless_forces,
+};
 use crate::progress::Progress;
 use crate::stop;
 use crate::{Error, InputError, Result};
@@ -33,6 +35,8 @@ enum Seen {
     CutList(PathBuf),
     Frf(FoundFrf),
     Force(FoundForce),
+    /// Cuts of one file.
+    Several(Vec<FoundForce>),
     /// Numbers without names, and why they were not understood.
     Nameless(FoundForce, Vec<PlainColumn>, String),
     /// Forces without times: what each is and its channel, and why the file was not understood.
@@ -87,6 +91,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
             Seen::CutList(path) => scan.cut_lists.push(path),
             Seen::Frf(frf) => scan.frfs.push(frf),
             Seen::Force(force) => scan.forces.push(force),
+            Seen::Several(forces) => scan.forces.extend(forces),
             Seen::Nameless(force, columns, why) => nameless.push((force, columns, why)),
             Seen::Timeless(force, channels, why) => timeless.push((force, channels, why)),
             Seen::NotUsed(path, why) => scan.not_used.push((path, why)),
@@ -252,6 +257,9 @@ fn look(name: String, file: &Path) -> Seen {
                 Ok(Some(columns)) if may_be_forces(&columns) => {
                     Seen::Nameless(force_of(name, file), columns, why)
                 }
+                _ if timeless_cuts(file).is_ok_and(|cuts| cuts.len() > 1) => {
+                    several(&force_of(name, file), file)
+                }
                 _ => match timeless_forces(file) {
                     Ok(channels) if !channels.is_empty() => {
                         Seen::Timeless(force_of(name, file), channels, why)
@@ -298,12 +306,23 @@ fn look(name: String, file: &Path) -> Seen {
     Seen::NotUsed(name, why)
 }
 
+/// The cuts of a file that holds more than one.
+fn several(of_file: &FoundForce, file: &Path) -> Seen {
+    let cuts = timeless_cuts(file).unwrap_or_default();
+    let each = cuts.into_iter().map(|cut| FoundForce {
+        part: Some(cut),
+        ..of_file.clone()
+    });
+    Seen::Several(each.collect())
+}
+
 fn force_of(name: String, file: &Path) -> FoundForce {
     FoundForce {
         // The whole path: folders are named by what was cut, too.
         from_name: facts_of(name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem)),
         from_header: header(file),
         path: name,
+        part: None,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::answers::Answers;
-use super::channels::{channels, timeless};
+use super::channels::{channels, channels_of_cuts, timeless};
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
@@ -35,6 +35,7 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
         tables.push(dynamometer(answers)?);
         tables.extend(channels(&scan.columns, answers)?);
         tables.extend(timeless(&scan.timeless, answers)?);
+        tables.extend(channels_of_cuts(&scan.forces, answers)?);
         tables.extend(cuts.into_iter().map(|(_, table)| table));
     }
     Ok(tables)
@@ -242,6 +243,20 @@ fn dynamometer(answers: &Answers) -> Result<DraftTable> {
 
 /// Ids of the cuts: the number in the file's name where that tells them apart, else the name.
 pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
+    if forces.iter().any(|f| f.part.is_some()) {
+        let part = |f: &FoundForce| f.part.as_ref().map(|(id, _)| id.clone());
+        let short: Vec<String> = forces
+            .iter()
+            .map(|f| part(f).unwrap_or_else(|| stem(&f.path).to_string()))
+            .collect();
+        let all_differ = short.iter().collect::<BTreeSet<_>>().len() == short.len();
+        let long = |f: &FoundForce| stem(&f.path).to_string() + "-" + &part(f).unwrap_or_default();
+        return if all_differ {
+            short
+        } else {
+            forces.iter().map(long).collect()
+        };
+    }
     let number = |force: &FoundForce| -> String {
         let name = stem(&force.path);
         let first = name.split(['_', '-', ' ']).next().unwrap_or(name);

@@ -191,7 +191,7 @@ fn without_times(path: &Path, error: InputError) -> InputError {
                 .take(SHOWN_CUTS)
                 .map(|(id, own)| {
                     format!(
-                        "\n[[cut]]\nid = \"{id}\"\nfile = \"{file}\"\nprocess = \"milling\"\nspindle_rpm = # fill in{}",
+                        "\n[[cut]]\nid = \"{id}\"\nfile = \"{file}\"\nprocess = \"milling\"\n# fill in: spindle_rpm, feed_per_tooth_mm, axial_depth_mm, immersion{}",
                         channels(Some(id), own)
                     )
                 })
@@ -205,8 +205,8 @@ fn without_times(path: &Path, error: InputError) -> InputError {
             ))
             .file(path)
             .remedy(format!(
-                "say in campaign.toml which channels are those of which cut, their unit and how fast they were sampled, for each cut such \
-                 as{lines}"
+                "say in campaign.toml which channels are those of which cut, their unit and how fast they were sampled (`lobestone init FOLDER \
+                 --rate-hz 10000` writes it), for each cut such as{lines}"
             ))
         }
     }

@@ -79,7 +79,7 @@ pub struct CutAnalysis {
     pub channels: Vec<ChannelAnalysis>,
     /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
     pub averages: [Option<Average>; 4],
-    /// Milling: the tooth-passing line of the channel that shows it most clearly; `None` where the window is too short for one.
+    /// Milling: the tooth-passing line in all force channels together; `None` where the window is too short for one.
     pub tooth_line: Option<ToothLine>,
     /// How the spindle ran, where it did not keep the stated speed.
     pub spindle: Option<SpindleTrack>,

@@ -41,6 +41,10 @@ const BASES: usize = 3;
 pub fn advise_cutting(data: &CuttingData, diagnosis: &Diagnosis<Cutting>) -> Result<NextMeasurement> {
     let (DiagnosisVerdict::Effect, Some(winner)) = (diagnosis.verdict, diagnosis.winner()) else {
         return Ok(NextMeasurement::words(match diagnosis.verdict {
+            DiagnosisVerdict::Unknown if data.speed_is_contradicted => {
+                "the same cuts once more, with sampling rate, spindle speed and columns written down, where these cannot be set right for \
+                 the records at hand"
+            }
             DiagnosisVerdict::Unknown => {
                 "the cut with the largest misfit once more, and once at half its feed: what repeats is physics"
             }

@@ -344,9 +344,8 @@ mod tests {
         let scan = super::super::scan::scan(folder.path()).unwrap();
         assert!(scan.not_used.is_empty(), "{:?}", scan.not_used);
         let mut answers = Answers::default();
-        let said = [("cut", "process", "milling"), ("channel", "rate_hz", "5000")];
-        said.iter()
-            .for_each(|(table, key, value)| answers.set(table, key, *value));
+        answers.set("cut", "process", "milling");
+        answers.set("channel", "rate_hz", "5000");
         let draft = Draft::new("cell", &scan, &answers).unwrap();
         let text = draft.toml();
         for id in ["R_1", "R_2"] {

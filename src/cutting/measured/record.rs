@@ -13,7 +13,9 @@ use crate::cutting::measured::average::average;
 use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
-use crate::cutting::measured::teeth::{idle_tooth, one_tooth_alone, tooth_back_mm, tooth_passing_too_weak};
+use crate::cutting::measured::teeth::{
+    CERTAIN, idle_tooth, one_tooth_alone, tooth_back_mm, tooth_passing_too_weak,
+};
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
 use crate::signal::{
@@ -503,15 +505,9 @@ fn teeth_notice(
                 power(*a).total_cmp(&power(*b))
             })
             .unwrap_or(1);
-        let stands_out = [0, 1]
-            .map(|a| orders[a][strongest - 1].norm_sqr())
-            .iter()
-            .sum::<f64>()
-            > 36.0
-                * [0, 1]
-                    .map(|a: usize| std[a][strongest - 1].powi(2))
-                    .iter()
-                    .sum::<f64>();
+        let power: f64 = orders.iter().map(|o| o[strongest - 1].norm_sqr()).sum();
+        let noise: f64 = std.iter().map(|s| s[strongest - 1].powi(2)).sum();
+        let stands_out = power > CERTAIN * CERTAIN * noise;
         let notice = if stands_out && part > MORE_THAN_ONE_TOOTH * one_tooth_alone(milling.teeth) {
             Notice {
                 kind: OTHER_MULTIPLE,

@@ -143,7 +143,7 @@ pub(crate) fn tooth_passing_too_weak(
 const STANDS_BACK: f64 = 0.15;
 const STANDS_BACK_OR_RUNOUT: f64 = 0.4;
 /// Standard errors above nothing.
-const CERTAIN: f64 = 6.0;
+pub(crate) const CERTAIN: f64 = 6.0;
 
 /// How far one tooth stands back against the others, mm, where that is no offset of the tool's axis (four teeth and more) or may
 /// be one (two, three); `None` where that is little, or not certain. `std`: of the orders, N.
@@ -372,7 +372,7 @@ mod tests {
         let orders: [Vec<Complex64>; 2] = [0, 1].map(|axis| {
             let of = |k: usize| match half_stated {
                 false => force(axis, k),
-                true if k % 2 == 0 => force(axis, k / 2),
+                true if k.is_multiple_of(2) => force(axis, k / 2),
                 true => Complex64::ZERO,
             };
             (1..=2 * teeth).map(of).collect()

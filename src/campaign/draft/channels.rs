@@ -2,9 +2,9 @@
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
-use super::found::FoundForce;
+use super::found::{FoundForce, cut_ids};
 use super::making::Making;
-use super::tables::cut_ids;
+
 use crate::Result;
 use crate::ingest::{PlainColumn, taken_for};
 

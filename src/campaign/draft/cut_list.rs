@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::answers::Answers;
-use super::found::{Scan, stem};
+use super::found::{Scan, cut_ids, stem};
 use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
-use super::tables::cut_ids;
 use crate::campaign::load::CUT;
 use crate::ingest::sheet_text;
 use crate::text::{closest, shown_briefly as shown};

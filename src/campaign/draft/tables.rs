@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::answers::Answers;
 use super::channels::{channels, channels_of_cuts, timeless};
 use super::entry::{DraftTable, Entry, Kind};
-use super::found::{FoundForce, FoundFrf, Scan, stem};
+use super::found::{FoundFrf, Scan, cut_ids};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
 use super::making::Making;
 use super::names::FROM_NAME;
@@ -239,47 +239,6 @@ fn dynamometer(answers: &Answers) -> Result<DraftTable> {
         )],
     )?;
     Ok(making.table)
-}
-
-/// Ids of the cuts: the number in the file's name where that tells them apart, else the name.
-pub(super) fn cut_ids(forces: &[FoundForce]) -> Vec<String> {
-    if forces.iter().any(|f| f.part.is_some()) {
-        let part = |f: &FoundForce| f.part.as_ref().map(|(id, _)| id.clone());
-        let short: Vec<String> = forces
-            .iter()
-            .map(|f| part(f).unwrap_or_else(|| stem(&f.path).to_string()))
-            .collect();
-        let all_differ = short.iter().collect::<BTreeSet<_>>().len() == short.len();
-        let long = |f: &FoundForce| stem(&f.path).to_string() + "-" + &part(f).unwrap_or_default();
-        return if all_differ {
-            short
-        } else {
-            forces.iter().map(long).collect()
-        };
-    }
-    let number = |force: &FoundForce| -> String {
-        let name = stem(&force.path);
-        let first = name.split(['_', '-', ' ']).next().unwrap_or(name);
-        first
-            .trim_start_matches(|c: char| !c.is_ascii_digit())
-            .to_string()
-    };
-    let unique = |ids: &[String]| {
-        let plain = |id: &String| !id.is_empty() && id.bytes().all(|b| b.is_ascii_digit());
-        ids.iter().all(plain) && ids.iter().collect::<BTreeSet<_>>().len() == ids.len()
-    };
-    let names = |name: fn(&str) -> &str| -> Vec<String> {
-        forces.iter().map(|f| name(&f.path).to_string()).collect()
-    };
-    let numbers: Vec<String> = forces.iter().map(number).collect();
-    if unique(&numbers) {
-        return numbers;
-    }
-    let stems = names(stem);
-    match stems.iter().collect::<BTreeSet<_>>().len() == stems.len() {
-        true => stems,
-        false => names(|path| path),
-    }
 }
 
 /// Keys of which one, where it is answered, leaves nothing for a file's name or header to say of the others.

@@ -318,9 +318,9 @@ fn time_row(record: &TimeRecord, channel: &Channel, samples: usize) -> Row {
     };
     let extent = format!(
         "{samples} samples at {} Hz, {seconds:.4} s from {} s",
-        // A resampled record's rate has no end of digits.
+        // A resampled record's rate has no end of digits, nor has a start within a sample.
         (record.sample_rate_hz * 1e4).round() / 1e4,
-        record.start_s
+        (record.start_s * 1e6).round() / 1e6
     );
     Row {
         json: json!({

@@ -37,6 +37,13 @@ pub fn shell_word(path: &Path) -> String {
     }
 }
 
+/// The first letter large.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
 /// The probability of a chance finding, in a sentence: `p = 0.03`, `p < 0.0001`. What is smaller tells a reader nothing more.
 pub fn chance(p: f64) -> String {
     const LEAST: f64 = 1e-4;

@@ -6,7 +6,7 @@ use super::text::{number, percent};
 use crate::campaign::{Campaign, campaign_file};
 use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::comparison::compare::ErrorTotals;
-use crate::discrepancy::diagnose::EXPLAINS_NOTHING_NRMS;
+use crate::discrepancy::diagnose::is_all_noise;
 use crate::discrepancy::verdict::is_noise;
 use crate::revision::{Revision, Side};
 use crate::text::shell_word;
@@ -128,7 +128,7 @@ impl<'a> Guide<'a> {
             percent(error.nrms),
             percent(error.noise_floor_nrms)
         );
-        if is_noise(reduced_chi2) && error.nrms > EXPLAINS_NOTHING_NRMS {
+        if is_all_noise(error.nrms, reduced_chi2) {
             return format!(
                 "{errors}: the model explains nothing, and the data are not told from noise: check columns, sampling rates and speeds in \
                  {} before anything else",

@@ -20,6 +20,17 @@ pub enum Quantity {
     Accelerance,
 }
 
+impl Quantity {
+    /// How often the displacement is differentiated in time: each time is a factor iω.
+    pub fn derivatives(self) -> u8 {
+        match self {
+            Quantity::Receptance => 0,
+            Quantity::Mobility => 1,
+            Quantity::Accelerance => 2,
+        }
+    }
+}
+
 /// One frequency response function, in SI per newton, in the quantity of the file.
 #[derive(Debug, Clone)]
 pub struct FrfRecord {

@@ -6,10 +6,11 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::cutting::ForceAxis;
-use crate::discrepancy::trend::{SIGNIFICANT, TrendPoint, digits, test};
+use crate::discrepancy::trend::{SIGNIFICANT, TrendPoint, test};
 use crate::identify::CutFit;
 use crate::identify::CuttingData;
 use crate::identify::forces::cutting_data::{CutData, CutKind};
+use crate::text::figures;
 
 /// What the rest is held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -130,11 +131,11 @@ impl Trend {
         let [first, last] = ends;
         let words = [first, middle, last].into_iter().flatten().map(|p| {
             let size = match self.unit {
-                "1" => format!("{} %", digits(100.0 * p.rest.abs())),
-                unit => format!("{} {unit}", digits(p.rest.abs())),
+                "1" => format!("{} %", figures(100.0 * p.rest.abs(), 2)),
+                unit => format!("{} {unit}", figures(p.rest.abs(), 2)),
             };
             let side = if p.rest < 0.0 { "below" } else { "above" };
-            let at = format!("{} {}", digits(p.x), self.x_unit);
+            let at = format!("{} {}", figures(p.x, 2), self.x_unit);
             format!("{size} {side} the model at {}", at.trim_end())
         });
         format!("the record is {}", words.collect::<Vec<_>>().join(", "))

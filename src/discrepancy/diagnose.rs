@@ -923,11 +923,16 @@ impl<'a, S: Study> Engine<'a, S> {
 }
 
 /// Error over the signal from which on a model explains nothing of it.
-pub(crate) const EXPLAINS_NOTHING_NRMS: f64 = 0.95;
+const EXPLAINS_NOTHING_NRMS: f64 = 0.95;
+
+/// Whether the signal itself is noise: a model whose error is as large as it leaves no more.
+pub(crate) fn is_all_noise(nrms: f64, reduced_chi2: f64) -> bool {
+    nrms > EXPLAINS_NOTHING_NRMS && verdict::is_noise(reduced_chi2)
+}
 
 /// Why there is nothing to judge where the signal itself is noise; `None` where there is.
 fn explains_nothing(nrms: f64, reduced_chi2: f64) -> Option<String> {
-    (nrms > EXPLAINS_NOTHING_NRMS && verdict::is_noise(reduced_chi2)).then(|| {
+    is_all_noise(nrms, reduced_chi2).then(|| {
         format!(
             "the model's error is as large as the signal ({:.0} %) and no larger than the noise, so that nothing in the data is told \
              from noise: check columns, sampling rates and speeds in campaign.toml (column, rate_hz, spindle_rpm), and that there was \

@@ -203,6 +203,13 @@ pub fn joint_trends(
         .map(|group| changes(model, &group.data, theta, &free))
         .collect::<Result<_>>()?;
     let gravity = Vector3::new(0.0, 0.0, -STANDARD_GRAVITY);
+    let torques_nm: Vec<Vec<f64>> = groups
+        .iter()
+        .map(|group| {
+            let kinematics = group.data.blocks.first().map(|block| &block.kinematics);
+            kinematics.map_or_else(Vec::new, |k| model.robot.gravity_torques_nm(k, gravity))
+        })
+        .collect();
     let mut found = JointTrends::default();
     for (k, &i) in free.iter().enumerate() {
         let name = &model.parameters[i].name;
@@ -211,20 +218,12 @@ pub fn joint_trends(
             .filter(|&g| own[g].1[k] < LITTLE_KNOWN * TIED)
             .collect();
         let x = |against: JointAgainst, g: usize| -> Option<f64> {
-            let PostureFrfs {
-                posture,
-                level_n,
-                data,
-            } = &groups[g];
+            let PostureFrfs { posture, level_n, .. } = &groups[g];
             match (against, joint) {
                 (JointAgainst::Order, _) => Some(*posture as f64 + 1.0),
                 (JointAgainst::ForceLevel, _) => *level_n,
                 (JointAgainst::Angle, Some(j)) => postures.get(*posture)?.joints_deg.get(j - 1).copied(),
-                (JointAgainst::GravityTorque, Some(j)) => {
-                    let kinematics = &data.blocks.first()?.kinematics;
-                    let torques_nm = model.robot.gravity_torques_nm(kinematics, gravity);
-                    torques_nm.get(j - 1).map(|t| t.abs())
-                }
+                (JointAgainst::GravityTorque, Some(j)) => torques_nm[g].get(j - 1).map(|t| t.abs()),
                 (JointAgainst::Angle | JointAgainst::GravityTorque, None) => None,
             }
         };

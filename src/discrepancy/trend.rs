@@ -17,6 +17,7 @@ pub struct TrendPoint {
 
 /// Below this a trend is no chance.
 pub const SIGNIFICANT: f64 = 0.01;
+
 /// A polynomial against points.
 pub(crate) struct TrendTest {
     /// Those that count.
@@ -69,14 +70,4 @@ fn misfit(points: &[TrendPoint], degree: usize, place: &dyn Fn(f64) -> f64) -> O
     let normal = basis.transpose() * &basis;
     let solution = normal.cholesky()?.solve(&(basis.transpose() * &values));
     Some((values - basis * solution).norm_squared())
-}
-
-/// Two figures that count, no exponent.
-pub(crate) fn digits(value: f64) -> String {
-    let decimals = if value == 0.0 {
-        0
-    } else {
-        (1 - value.abs().log10().floor() as i32).clamp(0, 6) as usize
-    };
-    format!("{value:.decimals$}")
 }

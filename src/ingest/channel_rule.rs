@@ -176,11 +176,14 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
     })
 }
 
-/// As [`read_file`]; a table of text or a file of arrays that says neither times nor a rate was sampled at `rate_hz`.
+/// As [`read_file`]; a table of text or a file of arrays that says neither times nor a rate was sampled at `rate_hz`, where that is known.
 ///
 /// # Errors
 /// Those of [`read_file`].
-pub fn read_file_at(path: &Path, rate_hz: f64) -> Result<MeasurementFile> {
+pub fn read_file_at(path: &Path, rate_hz: Option<f64>) -> Result<MeasurementFile> {
+    let Some(rate_hz) = rate_hz else {
+        return read_file(path);
+    };
     let error = match read_file(path) {
         Ok(mut file) => {
             let own = file.contents.times.first().map(|t| t.sample_rate_hz);
@@ -384,16 +387,35 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, Plain
     Ok(Some((format, found)))
 }
 
-/// The forces of a file that says neither times nor a sampling rate: what each is (`fx`) and how its channel is called; empty
-/// where the file holds none, or says its times.
+/// What a force is (`fx`), and how its channel is called.
+pub type NamedForce = (&'static str, String);
+
+/// Forces of one cut in a file that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
+/// cut), and the channels.
+pub type TimelessCut = (String, Vec<NamedForce>);
+
+/// What is in a file that says neither times nor a sampling rate; nothing where it holds no forces, or says its times.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Timeless {
+    /// The forces, as those of one cut.
+    pub forces: Vec<NamedForce>,
+    /// The cuts, told apart by what stands beside Fx, Fy, Fz, Mz in the names of the channels (`Fx_R_1`, `Fy_R_1`: `R_1`).
+    pub cuts: Vec<TimelessCut>,
+}
+
+/// Looks for forces in a file that says neither times nor a sampling rate.
 ///
 /// # Errors
 /// The operating system's.
-pub fn timeless_forces(path: &Path) -> Result<Vec<(&'static str, String)>> {
-    Ok(forces_of(&timeless_records(path)?))
+pub fn timeless(path: &Path) -> Result<Timeless> {
+    let records = timeless_records(path)?;
+    Ok(Timeless {
+        forces: forces_of(&records),
+        cuts: cuts_of(&records),
+    })
 }
 
-fn forces_of(records: &[TimeRecord]) -> Vec<(&'static str, String)> {
+fn forces_of(records: &[TimeRecord]) -> Vec<NamedForce> {
     let of = |channel: &Channel| {
         let what = match channel.role {
             ChannelRole::ForceX => "fx",
@@ -408,17 +430,7 @@ fn forces_of(records: &[TimeRecord]) -> Vec<(&'static str, String)> {
     first.map_or_else(Vec::new, |record| record.channels.iter().filter_map(of).collect())
 }
 
-/// Forces of one cut in a file that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
-/// cut), and what each is and how it is called.
-pub type TimelessCut = (String, Vec<(&'static str, String)>);
-
-/// The cuts in a file that says neither times nor a sampling rate, told apart by what stands beside Fx, Fy, Fz, Mz in the names of
-/// the channels (`Fx_R_1`, `Fy_R_1`: `R_1`); empty where the file holds no forces, or says its times.
-///
-/// # Errors
-/// The operating system's.
-pub fn timeless_cuts(path: &Path) -> Result<Vec<TimelessCut>> {
-    let records = timeless_records(path)?;
+fn cuts_of(records: &[TimeRecord]) -> Vec<TimelessCut> {
     let named = |channel: &Channel| -> Option<(&'static str, String, String)> {
         let name = channel.name.as_str();
         let lower = name.to_ascii_lowercase();
@@ -438,9 +450,9 @@ pub fn timeless_cuts(path: &Path) -> Result<Vec<TimelessCut>> {
         .all(|(what, ..)| found.iter().filter(|(other, ..)| what == other).count() == 1);
     // Units and the like stand beside the names of one cut, too.
     if is_one_cut {
-        let own = forces_of(&records);
+        let own = forces_of(records);
         let some = (!own.is_empty()).then(|| (String::new(), own));
-        return Ok(some.into_iter().collect());
+        return some.into_iter().collect();
     }
     let mut cuts: Vec<TimelessCut> = Vec::new();
     for (what, name, id) in found {
@@ -458,7 +470,7 @@ pub fn timeless_cuts(path: &Path) -> Result<Vec<TimelessCut>> {
     }
     // A force without another beside it is no dynamometer's record.
     cuts.retain(|(_, channels)| channels.len() > 1);
-    Ok(cuts)
+    cuts
 }
 
 /// The records of a file that says neither times nor a sampling rate, at any rate; empty where it says its times.
@@ -674,7 +686,7 @@ mod tests {
         let forces = |name: &str, bytes: &[u8]| {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            (timeless_forces(&path).unwrap(), path)
+            (timeless(&path).unwrap().forces, path)
         };
         let ramp: Vec<f64> = (0..600).map(f64::from).collect();
         let mat = crate::ingest::mat5_bytes(&[crate::ingest::MatArray::column("Fx", &ramp)]);
@@ -699,7 +711,7 @@ mod tests {
                 .map(|n| crate::ingest::MatArray::column(n, &ramp))
                 .collect();
             std::fs::write(&path, crate::ingest::mat5_bytes(&arrays)).unwrap();
-            timeless_cuts(&path).unwrap()
+            timeless(&path).unwrap().cuts
         };
         let found = cuts(&["Fx_R_1", "Fy_R_1", "Fz_R_1", "Fx_R_2", "Fy_R_2"]);
         let of = |id: &str| found.iter().find(|(own, _)| own == id).map(|(_, c)| c.clone());

@@ -60,6 +60,12 @@ fn dof_of_token(token: &str) -> Option<(Side, Dof)> {
     Some((side(word), dof))
 }
 
+/// Response and reference where a name says both.
+pub(super) fn both(name: &str) -> Option<(Dof, Dof)> {
+    let (response, reference) = dofs(name);
+    response.zip(reference)
+}
+
 /// Response and reference that a name says. Words decide (`resp`, `ref`, …), else the order: response first.
 pub(super) fn dofs(name: &str) -> (Option<Dof>, Option<Dof>) {
     let mut found: Vec<(Side, Dof)> = Vec::new();

@@ -23,8 +23,8 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{
-    ChannelRule, Gain, Measures, Source, TimelessCut, read_file_at, read_time_with, timeless_cuts,
-    timeless_forces, unit_of_charge_or_other,
+    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, read_file_at, read_time_with,
+    timeless, unit_of_charge_or_other,
 };
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
 pub use formats::columns::{

@@ -51,10 +51,10 @@ impl PlainColumn {
     }
 
     /// That only the file's start was looked at, where it is longer: a cut that begins later is not in the range.
-    pub fn how_far(&self) -> &'static str {
+    pub fn how_far(&self) -> String {
         match self.rows >= ROWS {
-            true => " in the first 2000 rows",
-            false => "",
+            true => format!(" in the first {ROWS} rows"),
+            false => String::new(),
         }
     }
 
@@ -144,7 +144,7 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
         "{} columns of numbers without names ({}{})",
         header.columns,
         seen.join("; "),
-        columns.first().map_or("", PlainColumn::how_far)
+        columns.first().map_or_else(String::new, PlainColumn::how_far)
     );
     let remedy = format!(
         "put a line of column names on top (frequency_hz,re,im for an FRF; time_s,force_n,acc_m_per_s2 for a tap test; \

@@ -18,7 +18,7 @@ use crate::effects::{Domain, Instance};
 use crate::identify::Modelled;
 use crate::identify::forces::cutting_waves::courses;
 use crate::identify::{CutFit, Estimate};
-use crate::text::{listed, shell_word};
+use crate::text::{capitalised, listed, shell_word};
 
 const ROBOT: &str = "Robot against FRFs";
 const FORCES: &str = "Cutting forces";
@@ -151,8 +151,7 @@ fn answer<D: Modelled>(
 
 /// `joint-2.stiffness` → `Stiffness of joint 2`.
 fn sentence_begin(parameter: &str) -> String {
-    let name = words::parameter(parameter);
-    let capital = name[..1].to_uppercase() + &name[1..];
+    let capital = capitalised(&words::parameter(parameter));
     match parameter.rsplit_once('.') {
         Some((owner, _)) => format!("{capital} of {}", words::at_place(owner)),
         None => capital,
@@ -243,9 +242,7 @@ fn robot_file_first(card: &mut VerdictCard, links: &WrongLinks) {
 
 /// The first letter large, a full stop at the end.
 fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().collect::<String>());
-    let text = first.unwrap_or_default() + letters.as_str();
+    let text = capitalised(text);
     match text.ends_with('.') {
         true => text,
         false => text + ".",

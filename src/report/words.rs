@@ -4,7 +4,7 @@ use super::number::significant;
 use crate::discrepancy::TrendPoint;
 use crate::discrepancy::joint_trends::{JointAgainst, JointTrend};
 use crate::effects::Site;
-use crate::text::chance;
+use crate::text::{capitalised, chance};
 
 /// `local-resonator` → `local resonator`.
 pub fn effect(id: &str) -> String {
@@ -93,12 +93,7 @@ pub fn parameter(key: &str) -> String {
     let named = NAMES.iter().find(|(name, _)| *name == bare);
     let words = match named {
         Some((_, words)) => (*words).to_string(),
-        None if bare.len() == 3 && bare.starts_with('k') => {
-            let mut letters = bare.chars();
-            letters
-                .next()
-                .map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
-        }
+        None if bare.len() == 3 && bare.starts_with('k') => capitalised(bare),
         None => bare.replace(['_', '-'], " "),
     };
     words + &index

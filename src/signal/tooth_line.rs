@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
 
 use super::blocks::median;
 
@@ -56,8 +56,9 @@ pub fn tooth_line(
         return None;
     }
     let mut power = vec![0.0; n / 2 + 1];
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     for samples in channels {
-        add_power(&samples[..n], &mut power);
+        add_power(&samples[..n], transform.as_ref(), &mut power);
     }
     let amplitude: Vec<f64> = power.into_iter().map(f64::sqrt).collect();
     let noise = median(&amplitude);
@@ -127,7 +128,7 @@ pub fn tooth_line(
 }
 
 /// Adds |X|² of a channel, a line taken out of it, to that of the others.
-fn add_power(samples: &[f64], power: &mut [f64]) {
+fn add_power(samples: &[f64], transform: &dyn RealToComplex<f64>, power: &mut [f64]) {
     let n = samples.len();
     let index = || (0..n).map(|i| i as f64);
     let (mean, slope, centre) = super::blocks::line(index(), samples.iter().copied());
@@ -139,7 +140,6 @@ fn add_power(samples: &[f64], power: &mut [f64]) {
             hann * (v - mean - slope * (i as f64 - centre))
         })
         .collect();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(n);
     let mut spectrum = transform.make_output_vec();
     // It fails with buffers of other lengths only, and these are its own.
     if transform.process(&mut input, &mut spectrum).is_ok() {

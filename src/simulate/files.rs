@@ -60,11 +60,7 @@ fn csv(frfs: &[FrfRecord]) -> String {
 /// Receptance, m/N, as the quantity that a sensor gives.
 pub fn as_quantity(receptance: Complex64, frequency_hz: f64, quantity: Quantity) -> Complex64 {
     let i_omega = Complex64::new(0.0, std::f64::consts::TAU * frequency_hz);
-    match quantity {
-        Quantity::Receptance => receptance,
-        Quantity::Mobility => receptance * i_omega,
-        Quantity::Accelerance => receptance * i_omega * i_omega,
-    }
+    (0..quantity.derivatives()).fold(receptance, |h, _| h * i_omega)
 }
 
 /// As `quantity` in campaign.toml.

@@ -39,10 +39,7 @@ pub(crate) struct Told {
 /// FRFs of one file: as they stand there, or from the hits of a raw record (none where no hit is good).
 pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result<Vec<FrfInput>> {
     let set = path.display().to_string();
-    let file = match reading.rate_hz {
-        Some(rate_hz) => ingest::read_file_at(path, rate_hz)?,
-        None => ingest::read_file(path)?,
-    };
+    let file = ingest::read_file_at(path, reading.rate_hz)?;
     told.warnings
         .extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
     if !file.contents.frfs.is_empty() {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::ingest::units;
-use crate::ingest::{self, Channel, Quantity, TimeRecord};
+use crate::ingest::{self, Channel, TimeRecord};
 use crate::modal::operational::{
     OperationalModes, OperationalRecord, OperationalSettings, operational_modes,
 };
@@ -40,10 +40,7 @@ pub fn of_files(
 }
 
 fn of_file(path: &Path, rate_hz: Option<f64>, settings: &OperationalSettings) -> Result<OperationalSet> {
-    let file = match rate_hz {
-        Some(rate_hz) => ingest::read_file_at(path, rate_hz)?,
-        None => ingest::read_file(path)?,
-    };
+    let file = ingest::read_file_at(path, rate_hz)?;
     let mut warnings = file.warnings;
     // Of several records the longest: correlations must not reach over the seam.
     let record = file.contents.times.iter().max_by_key(|r| r.len());
@@ -92,14 +89,7 @@ fn of_file(path: &Path, rate_hz: Option<f64>, settings: &OperationalSettings) ->
 /// How often each channel has to be differentiated in time to be what the one is that is differentiated most (displacement, velocity,
 /// acceleration); nothing where a unit is not known.
 fn differentiations(channels: &[&Channel]) -> Vec<u8> {
-    let derivative = |c: &&Channel| {
-        let motion = units::parse(&c.file_unit)?.dimension.motion()?;
-        Some(match motion {
-            Quantity::Receptance => 0,
-            Quantity::Mobility => 1,
-            Quantity::Accelerance => 2,
-        })
-    };
+    let derivative = |c: &&Channel| Some(units::parse(&c.file_unit)?.dimension.motion()?.derivatives());
     let Some(found) = channels.iter().map(derivative).collect::<Option<Vec<u8>>>() else {
         return Vec::new();
     };

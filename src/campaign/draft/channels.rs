@@ -4,9 +4,8 @@ use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundForce, cut_ids};
 use super::making::Making;
-
 use crate::Result;
-use crate::ingest::{PlainColumn, taken_for};
+use crate::ingest::{NamedForce, PlainColumn, taken_for};
 
 /// A section for the time, where there is one, and for each signal, taken as x, y, z and torque in their order.
 pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec<DraftTable>> {
@@ -61,18 +60,10 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
 pub(super) fn channels_of_cuts(forces: &[FoundForce], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
     for (force, id) in forces.iter().zip(cut_ids(forces)) {
-        for (what, called) in force.part.iter().flat_map(|(_, channels)| channels) {
-            let mut making = Making::new(answers, "channel", what, true);
-            making.fact("name", Kind::Text, what);
-            making.fact("in_file", Kind::Text, called);
+        for channel in force.part.iter().flat_map(|(_, channels)| channels) {
+            let mut making = named(channel, answers);
             making.fact("cut", Kind::Text, &id);
-            let rate = Entry::new(
-                "rate_hz",
-                Kind::Number,
-                "samples a second, Hz (the files do not say it)",
-                "10000.0",
-            );
-            making.add(rate, &[])?;
+            making.add(rate(), &[])?;
             tables.push(making.table);
         }
     }
@@ -80,22 +71,31 @@ pub(super) fn channels_of_cuts(forces: &[FoundForce], answers: &Answers) -> Resu
 }
 
 /// Sections for channels that have names in files that say neither times nor a rate: the rate is what is missing.
-pub(super) fn timeless(forces: &[(&'static str, String)], answers: &Answers) -> Result<Vec<DraftTable>> {
+pub(super) fn timeless(forces: &[NamedForce], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
-    for (i, (what, called)) in forces.iter().enumerate() {
-        let mut making = Making::new(answers, "channel", what, true);
-        making.fact("name", Kind::Text, what);
-        making.fact("in_file", Kind::Text, called);
+    for (i, channel) in forces.iter().enumerate() {
+        let mut making = named(channel, answers);
         if i == 0 {
-            let rate = Entry::new(
-                "rate_hz",
-                Kind::Number,
-                "samples a second, Hz (the files do not say it)",
-                "10000.0",
-            );
-            making.add(rate, &[])?;
+            making.add(rate(), &[])?;
         }
         tables.push(making.table);
     }
     Ok(tables)
+}
+
+/// A section for a channel that has a name in its file.
+fn named<'a>((what, called): &NamedForce, answers: &'a Answers) -> Making<'a> {
+    let mut making = Making::new(answers, "channel", what, true);
+    making.fact("name", Kind::Text, what);
+    making.fact("in_file", Kind::Text, called);
+    making
+}
+
+fn rate() -> Entry {
+    Entry::new(
+        "rate_hz",
+        Kind::Number,
+        "samples a second, Hz (the files do not say it)",
+        "10000.0",
+    )
 }

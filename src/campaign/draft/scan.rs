@@ -12,7 +12,7 @@ use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{ChannelRole, Quantity, RobotSpec};
 use crate::ingest::{
-    PlainColumn, SIGNALS, plain_columns, sheet_text, survey, timeless_cuts, timeless_forces,
+    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, plain_columns, sheet_text, survey, timeless,
 };
 use crate::progress::Progress;
 use crate::stop;
@@ -40,7 +40,7 @@ enum Seen {
     /// Numbers without names, and why they were not understood.
     Nameless(FoundForce, Vec<PlainColumn>, String),
     /// Forces without times: what each is and its channel, and why the file was not understood.
-    Timeless(FoundForce, Vec<(&'static str, String)>, String),
+    Timeless(FoundForce, Vec<NamedForce>, String),
     NotUsed(String, String),
 }
 
@@ -257,12 +257,10 @@ fn look(name: String, file: &Path) -> Seen {
                 Ok(Some(columns)) if may_be_forces(&columns) => {
                     Seen::Nameless(force_of(name, file), columns, why)
                 }
-                _ if timeless_cuts(file).is_ok_and(|cuts| cuts.len() > 1) => {
-                    several(&force_of(name, file), file)
-                }
-                _ => match timeless_forces(file) {
-                    Ok(channels) if !channels.is_empty() => {
-                        Seen::Timeless(force_of(name, file), channels, why)
+                _ => match timeless(file).unwrap_or_default() {
+                    Timeless { cuts, .. } if cuts.len() > 1 => several(&force_of(name, file), cuts),
+                    Timeless { forces, .. } if !forces.is_empty() => {
+                        Seen::Timeless(force_of(name, file), forces, why)
                     }
                     _ => Seen::NotUsed(name, why),
                 },
@@ -307,8 +305,7 @@ fn look(name: String, file: &Path) -> Seen {
 }
 
 /// The cuts of a file that holds more than one.
-fn several(of_file: &FoundForce, file: &Path) -> Seen {
-    let cuts = timeless_cuts(file).unwrap_or_default();
+fn several(of_file: &FoundForce, cuts: Vec<TimelessCut>) -> Seen {
     let each = cuts.into_iter().map(|cut| FoundForce {
         part: Some(cut),
         ..of_file.clone()
@@ -345,7 +342,7 @@ fn may_be_forces(columns: &[PlainColumn]) -> bool {
 }
 
 /// A file, what its channels are and how they are called, and why it was not understood.
-type TimelessForce = (FoundForce, Vec<(&'static str, String)>, String);
+type TimelessForce = (FoundForce, Vec<NamedForce>, String);
 
 /// Files whose forces have names and no times are the folder's force records where no other says its times and all have the
 /// same channels: the sampling rate is asked once.

@@ -148,7 +148,7 @@ const SHOWN_CUTS: usize = 2;
 /// What to tell of a file that was not understood: where forces without times are all that is in it, which they are and the lines
 /// that say the rest; else `error`, as it is.
 fn without_times(path: &Path, error: InputError) -> InputError {
-    let cuts = ingest::timeless_cuts(path).unwrap_or_default();
+    let cuts = ingest::timeless(path).unwrap_or_default().cuts;
     let names = |cuts: &[ingest::TimelessCut]| {
         let all: Vec<&str> = cuts
             .iter()
@@ -156,18 +156,18 @@ fn without_times(path: &Path, error: InputError) -> InputError {
             .collect();
         all.join(", ")
     };
-    let channels = |cut: Option<&str>, channels: &[(&'static str, String)]| -> String {
+    let channels = |cut: Option<&str>, channels: &[ingest::NamedForce]| -> String {
         let each = channels.iter().enumerate().map(|(i, (what, name))| {
-            let of_cut = cut.map_or(String::new(), |id| {
-                format!("\nunit = \"N\"\nrate_hz = 10000.0\ncut = \"{id}\"")
+            let [unit, of_cut] = cut.map_or(Default::default(), |id| {
+                ["\nunit = \"N\"".to_string(), format!("\ncut = \"{id}\"")]
             });
             // Of one table all columns have one rate.
-            let rate = if cut.is_none() && i == 0 {
+            let rate = if cut.is_some() || i == 0 {
                 "\nrate_hz = 10000.0"
             } else {
                 ""
             };
-            format!("\n[[channel]]\nname = \"{what}\"\nin_file = \"{name}\"{rate}{of_cut}")
+            format!("\n[[channel]]\nname = \"{what}\"\nin_file = \"{name}\"{unit}{rate}{of_cut}")
         });
         each.collect()
     };

@@ -16,6 +16,7 @@ use crate::cutting::{
     KnownValue, MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, by_axis,
     coefficients_of, depth_mm, speed_text,
 };
+use crate::text::capitalised;
 
 #[derive(clap::Args)]
 pub struct CfcArgs {
@@ -192,7 +193,7 @@ fn coefficient_table(groups: &[&ForceGroup], pooled: &ForceGroup) -> String {
         );
         rows.push(row);
     }
-    let process = capital(pooled.process.name());
+    let process = capitalised(pooled.process.name());
     let method = match pooled.method {
         RegressionMethod::LeastSquares => "least squares",
         RegressionMethod::Huber => "robust (Huber) regression",
@@ -391,13 +392,6 @@ fn with_error(value: f64, error: f64) -> String {
         4
     };
     format!("{value:.decimals$} ± {error:.decimals$}")
-}
-
-fn capital(word: &str) -> String {
-    let mut letters = word.chars();
-    letters
-        .next()
-        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Columns aligned to the right, the first to the left.

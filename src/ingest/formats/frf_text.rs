@@ -557,10 +557,7 @@ fn dofs(name: &str, notes: &mut Notes) -> (Option<Dof>, Option<Dof>) {
     let both = name
         .split_once('/')
         .and_then(|(a, b)| Some((a.parse::<Dof>().ok()?, b.parse::<Dof>().ok()?)));
-    let both = both.or(match dof_names::dofs(name) {
-        (Some(response), Some(reference)) => Some((response, reference)),
-        _ => None,
-    });
+    let both = both.or_else(|| dof_names::both(name));
     if both.is_none() {
         notes.about(
             name,

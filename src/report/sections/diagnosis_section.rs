@@ -18,7 +18,7 @@ use crate::report::parts::{figure, paragraph};
 use crate::report::sections::error_map_section::times_noise_map;
 use crate::report::words::{at_place, frf_name};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn, words};
-use crate::text::{chance, listed, shell_word};
+use crate::text::{capitalised, chance, listed, shell_word};
 
 pub const ID: &str = "missing-physics";
 pub const TITLE: &str = "Which physics is missing";
@@ -170,15 +170,14 @@ fn joint_by_joint(findings: &DiagnosisFindings) -> Vec<Block> {
 
 fn joint_figure(rank: usize, trend: &JointTrend) -> Block {
     let against = trend.against.words();
-    let capital = |text: &str| text[..1].to_uppercase() + &text[1..];
     let drawing = TrendFigure {
-        title: capital(&format!(
+        title: capitalised(&format!(
             "{} against {against}",
             words::parameter_of(&trend.parameter)
         )),
         x_label: match trend.x_unit {
             "" => "Place of the posture in the campaign".to_string(),
-            unit => format!("{} ({unit})", capital(against.trim_start_matches("the "))),
+            unit => format!("{} ({unit})", capitalised(against.trim_start_matches("the "))),
         },
         y_label: "Change (%)".into(),
         of: ["fitted to one posture", "fitted to all"],
@@ -188,7 +187,7 @@ fn joint_figure(rank: usize, trend: &JointTrend) -> Block {
             .map(|p| [p.x, 100.0 * p.rest.exp_m1(), 100.0 * p.std * p.rest.exp()])
             .collect(),
     };
-    let caption = format!("{}.", capital(&words::joint_trend(trend)));
+    let caption = format!("{}.", capitalised(&words::joint_trend(trend)));
     figure(
         format!("joint-by-joint-{}", rank + 1),
         &drawing.title.clone(),

@@ -15,8 +15,8 @@ use crate::report::sections::diagnosis_section::{
 use crate::report::sections::error_map_section::{LEAST_TOP, TIMES_NOISE};
 use crate::report::words::{parameter_of, setting};
 use crate::report::{Block, ReportSection, ReportTable, TableColumn};
-use crate::text::chance;
 use crate::text::listed;
+use crate::text::{capitalised, chance};
 
 pub const ID: &str = "missing-physics-cutting";
 pub const TITLE: &str = "Which physics the force model lacks";
@@ -214,11 +214,10 @@ fn trend(findings: &CuttingFindings) -> Option<Block> {
         "1" => ("%", 100.0),
         unit => (unit, 1.0),
     };
-    let capital = |text: &str| text[..1].to_uppercase() + &text[1..];
     let name = words.trim_start_matches("the ");
     let x_label = match first.x_unit {
-        "" => capital(name),
-        unit => format!("{} ({unit})", capital(name)),
+        "" => capitalised(name),
+        unit => format!("{} ({unit})", capitalised(name)),
     };
     let of = first.axis.map_or("Rest of the force".to_string(), |a| {
         format!("Rest of {}", a.label())

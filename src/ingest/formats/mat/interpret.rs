@@ -142,9 +142,8 @@ fn tables(
         }
         budget.take(48 * variable.re.len(), &format!("variable {}", variable.name))?;
         let column = |c: usize| &variable.re[c * rows..(c + 1) * rows];
-        let values = |c: usize| -> Vec<Complex64> {
-            (c * rows..(c + 1) * rows).map(|i| complex(variable, i)).collect()
-        };
+        let values =
+            |c: usize| -> Vec<Complex64> { (c * rows..(c + 1) * rows).map(|i| variable.value(i)).collect() };
         let mut frf = |name: String, value: Vec<Complex64>, notes: &mut Notes| {
             let mut record = record(variable, name, axis, value);
             if let Some((quantity, factor)) = units::parse(&channel_unit(variable, variables, labels))
@@ -249,10 +248,7 @@ const SAMPLE_STEP_S: f64 = 2e-3;
 
 /// An FRF of a variable.
 fn record(variable: &Variable, name: String, axis: &[f64], value: Vec<Complex64>) -> FrfRecord {
-    let (response, reference) = match dof_names::dofs(variable.own_name()) {
-        (Some(response), Some(reference)) => (Some(response), Some(reference)),
-        _ => (None, None),
-    };
+    let (response, reference) = dof_names::both(variable.own_name()).unzip();
     FrfRecord {
         name,
         response,
@@ -402,7 +398,7 @@ fn frequency_functions(
             budget.take(memory, &format!("variable {}", variable.name))?;
             used[k] = true;
             for (suffix, at) in vectors {
-                let value = || at.iter().map(|&i| complex(variable, i)).collect::<Vec<_>>();
+                let value = || at.iter().map(|&i| variable.value(i)).collect::<Vec<_>>();
                 match kind {
                     Kind::Frf => {
                         let record =
@@ -516,10 +512,6 @@ fn quantity(variable: &Variable) -> Option<Quantity> {
     } else {
         None
     }
-}
-
-fn complex(variable: &Variable, at: usize) -> Complex64 {
-    Complex64::new(variable.re[at], variable.im.as_ref().map_or(0.0, |im| im[at]))
 }
 
 /// Real arrays along a time axis, or, where there is only a sampling rate, along the longest dimension there is.

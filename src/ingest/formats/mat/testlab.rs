@@ -57,6 +57,9 @@ pub(super) fn functions(
         // The label is what Testlab shows; the numbers are in the system that the note names.
         let is_si = text("y_values.quantity.info").contains("MKS");
         let x_label = text("x_values.quantity.label");
+        if x_label != "Hz" && (x_label != "s" || values.im.is_some()) {
+            continue;
+        }
         let columns = values.re.len() / rows;
         let column_name = |c: usize| match columns {
             1 => name.clone(),
@@ -64,16 +67,10 @@ pub(super) fn functions(
         };
         for c in 0..columns {
             let range = c * rows..(c + 1) * rows;
-            let complex = || -> Vec<Complex64> {
-                let im = |i: usize| values.im.as_ref().map_or(0.0, |im| im[i]);
-                range
-                    .clone()
-                    .map(|i| Complex64::new(values.re[i], im(i)))
-                    .collect()
-            };
+            let complex = || -> Vec<Complex64> { range.clone().map(|i| values.value(i)).collect() };
             let axis = || -> Vec<f64> { (0..rows).map(|k| start + step * k as f64).collect() };
             match x_label.as_str() {
-                "s" if values.im.is_none() => {
+                "s" => {
                     let unit = match units::parse(&label)
                         .filter(|_| is_si)
                         .and_then(|u| u.dimension.describe())
@@ -88,10 +85,7 @@ pub(super) fn functions(
                 "Hz" if is_frf(&kind, &label, values) => {
                     let unit = units::parse(&label).and_then(|u| u.dimension.frf().zip(Some(u.factor)));
                     let factor = unit.filter(|_| !is_si).map_or(1.0, |(_, factor)| factor);
-                    let (response, reference) = match dof_names::dofs(&column_name(c)) {
-                        (Some(response), Some(reference)) => (Some(response), Some(reference)),
-                        _ => (None, None),
-                    };
+                    let (response, reference) = dof_names::both(&column_name(c)).unzip();
                     let record = FrfRecord {
                         name: column_name(c),
                         response,
@@ -103,7 +97,7 @@ pub(super) fn functions(
                     };
                     contents.frfs.extend(checks::tidy_frf(record, notes)?);
                 }
-                "Hz" => contents.others.push(OtherRecord {
+                _ => contents.others.push(OtherRecord {
                     kind: other(&kind),
                     name: column_name(c),
                     abscissa: axis(),
@@ -111,12 +105,11 @@ pub(super) fn functions(
                     value: complex(),
                     unit: label.clone(),
                 }),
-                _ => continue,
             }
-            let inside = format!("{root}.");
-            for (used, variable) in used.iter_mut().zip(variables) {
-                *used |= variable.name.starts_with(&inside);
-            }
+        }
+        let inside = format!("{root}.");
+        for (used, variable) in used.iter_mut().zip(variables) {
+            *used |= variable.name.starts_with(&inside);
         }
         if is_si && !label.is_empty() {
             notes.about(

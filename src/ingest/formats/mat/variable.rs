@@ -1,5 +1,7 @@
 //! An array of a MAT-file, and what its name says of it.
 
+use num_complex::Complex64;
+
 /// Shorter vectors are no axis.
 pub(crate) const MIN_AXIS: usize = 4;
 
@@ -22,6 +24,11 @@ pub(crate) struct Labels {
 }
 
 impl Variable {
+    /// The value at an index into [`re`](Self::re).
+    pub fn value(&self, at: usize) -> Complex64 {
+        Complex64::new(self.re[at], self.im.as_ref().map_or(0.0, |im| im[at]))
+    }
+
     /// The name without the structs it lies in.
     pub fn own_name(&self) -> &str {
         self.name.rsplit('.').next().unwrap_or(&self.name)

@@ -7,6 +7,7 @@ mod answer;
 pub mod case_study;
 mod cutting_reading;
 pub mod cutting_tables;
+pub mod drawn_case;
 pub mod findings;
 pub mod lobe_assumptions;
 pub mod measured_lobes;

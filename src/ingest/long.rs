@@ -16,8 +16,11 @@ use crate::ingest::tables::table::{Table, holds};
 use crate::progress::Progress;
 use crate::{Error, Result};
 
-/// Bytes of text held at once. A record of 50 s, 4 channels and 10 kHz is read in one piece.
-const PIECE: usize = 64 << 20;
+/// Bytes of text up to which a file is read as a whole: a record of 150 s, 4 channels and 10 kHz.
+const SHORT: usize = 64 << 20;
+/// Bytes of text held at once of a longer one: few enough for text and numbers to stay in the processor's cache between one
+/// look at them and the next.
+const PIECE: usize = 4 << 20;
 
 /// A file that was read, or one that is read piece by piece.
 pub(super) enum Opened {
@@ -25,7 +28,7 @@ pub(super) enum Opened {
     Long(Box<LongRecord>),
 }
 
-/// A time table of more than [`PIECE`] bytes.
+/// A time table of more than [`SHORT`] bytes.
 pub(super) struct LongRecord {
     path: PathBuf,
     bytes: u64,
@@ -116,24 +119,24 @@ pub fn survey(path: &Path) -> Result<Survey> {
 
 /// Reads a file, or opens it as a long record.
 pub(super) fn open(path: &Path) -> Result<Opened> {
-    open_by(path, PIECE)
+    open_by(path, SHORT, PIECE)
 }
 
-fn open_by(path: &Path, piece: usize) -> Result<Opened> {
+fn open_by(path: &Path, short: usize, piece: usize) -> Result<Opened> {
     let refused = |e| Error::io(path, e);
     regular_file(path)?;
     let mut file = File::open(path).map_err(refused)?;
     let bytes = file.metadata().map_err(refused)?.len();
-    let mut head = Vec::with_capacity(bytes.min(piece as u64) as usize + 1);
+    let is_short = bytes <= short as u64;
+    let at_once = if is_short { short } else { piece };
+    let mut head = Vec::with_capacity(bytes.min(at_once as u64) as usize + 1);
     (&mut file)
-        .take(piece as u64)
+        .take(at_once as u64)
         .read_to_end(&mut head)
         .map_err(refused)?;
     // Of the rows of a long record nothing but what is not yet read stays in `head`.
     let head_digest = Digest::of(&head);
-    if bytes > piece as u64
-        && let Some(long) = long_record(path, &mut head, bytes)
-    {
+    if !is_short && let Some(long) = long_record(path, &mut head, bytes) {
         let (format, why, pieces, notes) = long;
         let line = pieces.header.data_line;
         let mut text = Text {
@@ -317,7 +320,7 @@ mod tests {
     }
 
     fn by_pieces(path: &Path, piece: usize) -> Result<MeasurementFile> {
-        match open_by(path, piece)? {
+        match open_by(path, piece, piece)? {
             Opened::Long(long) => long.whole(),
             Opened::Read(_) => panic!("read as a whole"),
         }

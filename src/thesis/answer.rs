@@ -25,6 +25,7 @@ impl RealCase {
         answer.push(self.open_text());
         answer.push(self.rigid_text());
         answer.push(self.widened_text());
+        answer.extend(self.drawn.answer());
         answer.extend(self.next_text());
         answer
     }

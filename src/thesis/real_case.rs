@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use super::drawn_case::{DrawnCase, drawn_case};
 use super::published::{MINIMA, MODAL, ModalRow, RECURRING_BANDS, STATIC_STIFFNESS, StaticRow, rows};
 use crate::discrepancy::comparison::difference::{Difference, Lookout, greatest_difference};
 use crate::discrepancy::verdict::{STRONG_BIC, evidence_weight};
@@ -11,7 +12,8 @@ use crate::identify::resonances::modal_table::{FREQUENCY_STD, PEAK_STD};
 use crate::identify::resonances::resonance_study::{
     Minimum, Resonance, ResonanceReading, ResonanceStudy, merged,
 };
-use crate::identify::{Estimate, StructureModel};
+use crate::identify::study::{Study, View};
+use crate::identify::{Estimate, LeastSquares, StructureModel};
 use crate::ingest::Axis;
 use crate::robot::{PostureReport, posture_deg};
 use crate::{Error, Result};
@@ -71,6 +73,8 @@ pub struct RealCase {
     pub next: Vec<TellingMeasurement>,
     /// Effects that the tables cannot show, with the reason.
     pub not_tried: Vec<(String, String)>,
+    /// What the tables draw where the library has no name.
+    pub drawn: DrawnCase,
 }
 
 /// A measured resonance, and the mode that comes nearest in the baseline and in the best candidate.
@@ -270,6 +274,7 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
     let study = study(model, 1.0)?;
     let diagnosis = diagnose(&study, model)?;
     let base = &diagnosis.baseline;
+    let base_cost = study.problem(model, View::FULL).cost(&base.theta)?;
     let best = diagnosis
         .candidates
         .first()
@@ -388,6 +393,7 @@ pub fn real_case(model: &StructureModel) -> Result<RealCase> {
         starts_agreeing: base.calibration.starts_agreeing,
         baseline_modes_hz: modes_hz(model, &base.theta)?,
         best_modes_hz: modes_hz(&best.model, &best.theta)?,
+        drawn: drawn_case(&study, model, (&base.theta, base_cost))?,
         widened: widened(model)?,
         not_tried,
         baseline,
@@ -415,7 +421,7 @@ fn widened(model: &StructureModel) -> Result<Widened> {
 }
 
 /// What can be checked of any explanation; the rest of its fields stays empty.
-fn checks(study: &ResonanceStudy, model: &StructureModel, theta: &[f64]) -> Result<Explanation> {
+pub(super) fn checks(study: &ResonanceStudy, model: &StructureModel, theta: &[f64]) -> Result<Explanation> {
     let matches = study.matches(model, theta)?;
     let pairs = || study.resonances().iter().zip(&matches);
     let farthest_joint = farthest_joint(model, theta);
@@ -556,5 +562,13 @@ mod tests {
         assert!(case.baseline.bands.iter().all(|b| b.met > 0 && !b.explained));
         let answer = case.answer().join(" ");
         assert!(answer.contains("not explained by rigid links"), "{answer}");
+        // Two tables at the tool point leave open where it is.
+        assert!(case.drawn.laws > 100 && case.drawn.places > 60);
+        assert!(
+            case.drawn.places_as_good.len() > 1,
+            "{:?}",
+            case.drawn.places_as_good
+        );
+        assert!(answer.contains("What cannot: where it is"), "{answer}");
     }
 }

@@ -189,6 +189,16 @@ fn the_catalogue_holds_every_effect() {
                 "docs/effects.md lacks of {id}: {text}\nrun python3 scripts/effect_catalogue.py"
             );
         }
+        // Simulated cuts always have edge forces: there they are never missing.
+        let own = catalogue
+            .split("### `")
+            .find(|part| part.starts_with(&format!("{id}`")))
+            .unwrap();
+        let shown = own.contains(&format!("(pictures/effects/{id}.png)")) && own.contains("**Look-alikes.**");
+        assert!(
+            shown || id == "edge-force",
+            "{id}: run python3 scripts/effect_fingerprints.py {id}"
+        );
     }
 }
 

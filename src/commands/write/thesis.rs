@@ -10,6 +10,7 @@ use crate::lobes::Peak;
 use crate::report::number::{format_si, plus_minus};
 use crate::report::sections::thesis_section;
 use crate::report::words::{parameter, parameter_of};
+use crate::thesis::drawn_case::{DrawnCase, DrawnPart};
 use crate::thesis::real_case::Explanation;
 use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
 
@@ -149,6 +150,7 @@ fn real_case(case: &RealCase) -> String {
         "\nWhich effect is missing there? The loop on both tables, all four configurations\n{}",
         table(&header, &rows)
     );
+    text += &format!("\nWhat the tables draw themselves\n{}", drawn(&case.drawn));
     for paragraph in case.answer().iter().chain(&case.caveats()) {
         text += &format!("  - {paragraph}\n");
     }
@@ -156,6 +158,40 @@ fn real_case(case: &RealCase) -> String {
         text += &format!("  not tried: {effect}: {reason}\n");
     }
     text
+}
+
+fn drawn(drawn: &DrawnCase) -> String {
+    let row = |part: &DrawnPart| {
+        let sizes = part.parameters.iter();
+        let sizes: Vec<String> = sizes
+            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
+            .collect();
+        let bands: Vec<String> = part
+            .bands
+            .iter()
+            .map(|b| format!("{}/{}", b.close, b.measured))
+            .collect();
+        let [low, high] = part.static_ratio;
+        vec![
+            part.name.clone(),
+            format!("{:+.1}", part.delta_bic),
+            format!("{:.1}", part.reduced_chi2),
+            bands.join(", "),
+            format!("{low:.2}-{high:.2}"),
+            if part.at_bound { "at its bound" } else { "" }.to_string(),
+            sizes.join(", "),
+        ]
+    };
+    let header = [
+        "law and place",
+        "BIC",
+        "variance",
+        "close by band",
+        "static/meas.",
+        "",
+        "parameters",
+    ];
+    table(&header, &drawn.parts.iter().map(row).collect::<Vec<_>>())
 }
 
 fn describe(study: &CaseStudy) -> String {

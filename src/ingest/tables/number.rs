@@ -76,7 +76,7 @@ pub fn scan(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize)> {
 /// Reads the plain number that starts at `start`: a sign, up to seven digits, the decimal sign and up to seven more, as
 /// recorders print samples. Eight bytes are read at a time, without a branch for each. `None` for all else (exponents, words,
 /// more digits, less than eight bytes to the end of the data), which [`scan`] reads; the values of both are the same.
-#[inline]
+#[inline(always)]
 pub fn scan_plain(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize)> {
     let negative = *bytes.get(start)? == b'-';
     let at = start + usize::from(negative);
@@ -97,20 +97,20 @@ pub fn scan_plain(bytes: &[u8], start: usize, decimal: u8) -> Option<(f64, usize
 const EACH: u64 = 0x0101_0101_0101_0101;
 
 /// Eight bytes, the first the lowest; what was a digit is 0 to 9.
-#[inline]
+#[inline(always)]
 fn word(bytes: &[u8], at: usize) -> Option<u64> {
     Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk::<8>()?) ^ (u64::from(b'0') * EACH))
 }
 
 /// The top bit of each byte that is no digit. Adding 118 reaches it from 10 on; bytes above 127 have it set already. A carry
 /// out of such a byte spoils what is said of bytes behind it, but not of the first two that are none where the first is ASCII.
-#[inline]
+#[inline(always)]
 fn others(word: u64) -> u64 {
     (word.wrapping_add(118 * EACH) | word) & (0x80 * EACH)
 }
 
 /// The number that eight digits are, by joining neighbours through multiplication (Lemire 2018, "Quickly parsing eight digits").
-#[inline]
+#[inline(always)]
 fn joined(word: u64) -> i64 {
     let pairs = (word.wrapping_mul(10) + (word >> 8)) & 0x00FF_00FF_00FF_00FF;
     let fours = (pairs.wrapping_mul(100) + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
@@ -120,7 +120,7 @@ fn joined(word: u64) -> i64 {
 /// Mantissa, digits behind the decimal sign and length of a number that, decimal sign included, is not longer than the word, as
 /// most samples are: the sign is taken out, and the digits on both sides of it are read at once. With a length of eight it may
 /// go on behind the word.
-#[inline]
+#[inline(always)]
 fn short(word: u64, decimal: u8) -> Option<(i64, usize, usize)> {
     let first = others(word);
     if first == 0 {
@@ -140,7 +140,7 @@ fn short(word: u64, decimal: u8) -> Option<(i64, usize, usize)> {
 }
 
 /// As [`short`], where whole part and fraction have a word each, or there is no fraction.
-#[inline]
+#[inline(always)]
 fn long(bytes: &[u8], at: usize, decimal: u8) -> Option<(i64, usize, usize)> {
     let (whole, whole_digits) = digits(bytes, at)?;
     if *bytes.get(at + whole_digits)? != decimal {
@@ -156,7 +156,7 @@ fn long(bytes: &[u8], at: usize, decimal: u8) -> Option<(i64, usize, usize)> {
 const POWERS: [i64; 8] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000];
 
 /// The digits that begin at `at` and how many they are; `None` for eight or more.
-#[inline]
+#[inline(always)]
 fn digits(bytes: &[u8], at: usize) -> Option<(i64, usize)> {
     let word = word(bytes, at)?;
     let count = (others(word).trailing_zeros() / 8) as usize;

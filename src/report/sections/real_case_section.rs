@@ -7,6 +7,7 @@ use crate::report::parts::{figure, paragraph};
 use crate::report::words::{at_place, parameter};
 use crate::report::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
+use crate::thesis::drawn_case::DrawnPart;
 use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
 
 pub fn blocks(case: &RealCase) -> Vec<Block> {
@@ -19,6 +20,7 @@ pub fn blocks(case: &RealCase) -> Vec<Block> {
     ))];
     blocks.push(resonance_figure(case));
     blocks.extend(explanations(case));
+    blocks.push(drawn(case));
     blocks.extend(case.answer().into_iter().map(paragraph));
     blocks.push(paragraph(format!("Caveats. {}", case.caveats().join(" "))));
     blocks
@@ -120,4 +122,50 @@ fn explanations(case: &RealCase) -> [Block; 2] {
         notes: Vec::new(),
     });
     [judged, fitted]
+}
+
+fn drawn(case: &RealCase) -> Block {
+    let row = |part: &DrawnPart| {
+        let sizes: Vec<String> = part
+            .parameters
+            .iter()
+            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
+            .collect();
+        let bands: Vec<String> = part
+            .bands
+            .iter()
+            .map(|b| format!("{} of {}", b.close, b.measured))
+            .collect();
+        let joint = part.farthest_joint.as_ref();
+        let [low, high] = part.static_ratio;
+        vec![
+            part.words.clone(),
+            format!(
+                "{}{}",
+                sizes.join(", "),
+                if part.at_bound { " (at its bound)" } else { "" }
+            ),
+            decimals(part.delta_bic, 1),
+            decimals(part.reduced_chi2, 1),
+            bands.join("; "),
+            joint.map_or("–".into(), |j| {
+                format!("{} × {}", parameter(&j.name), decimals(j.factor, 2))
+            }),
+            format!("{} to {}", decimals(low, 2), decimals(high, 2)),
+        ]
+    };
+    Block::Table(ReportTable {
+        caption: "What the tables draw themselves: simple laws besides the joints, best first".into(),
+        columns: vec![
+            TableColumn::text("law and place"),
+            TableColumn::text("best fit"),
+            TableColumn::number("BIC difference"),
+            TableColumn::number("variance left (1 is noise)"),
+            TableColumn::number("resonances within two standard deviations, by band"),
+            TableColumn::text("joint moved farthest"),
+            TableColumn::number("static stiffness, model / measured"),
+        ],
+        rows: case.drawn.parts.iter().map(row).collect(),
+        notes: Vec::new(),
+    })
 }

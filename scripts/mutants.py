@@ -427,6 +427,11 @@ def main():
     ignored = subprocess.run([program, "--list", "--format=terse", "--ignored"], capture_output=True, text=True, cwd=copy).stdout
     ignored = {line.rsplit(":", 1)[0] for line in ignored.splitlines()}
     tests = [t for t in tests if t not in ignored]
+    if args.again:
+        # What took too long there does so here.
+        each = [json.loads((Path(folder) / "reached.json").read_text()) for folder in args.again.split(",")]
+        slow = {test for log in each for test, _, took, _ in log if took >= args.slowest}
+        tests = [t for t in tests if t not in slow]
     reached, seconds = {}, {}
 
     def look(k_test):

@@ -519,4 +519,53 @@ mod tests {
         let above = lead(&|_, _, _, _, _| 0.0).map_or(0.0, |l| l.above_noise_n);
         assert!(above < 0.5, "{above} N");
     }
+
+    use crate::identify::CuttingModel;
+    use crate::identify::forces::made_cuts::{METAL, MILLED, milled};
+
+    /// A mean that is off by 2 N in six blocks of 1 N error, and an order that is off by 5 N of 1 N: amplitudes of 2 N and 10 N, mean
+    /// squares less those of the noise, 1/6 N² and 2 N².
+    #[test]
+    fn lines_of_the_rest_have_their_amplitude_and_stand_above_the_noise() {
+        let mut data = milled(METAL, &MILLED[..1]);
+        let model = CuttingModel::new(&data, true).unwrap();
+        let problem = CuttingProblem {
+            model: &model,
+            data: &data,
+        };
+        let fit = problem.fits(&METAL).unwrap().remove(0);
+        let cut = std::sync::Arc::make_mut(&mut data.cuts[0]);
+        for (channel, made) in cut
+            .channels
+            .iter_mut()
+            .flatten()
+            .zip(fit.channels.iter().flatten())
+        {
+            channel.orders.clone_from(&made.orders);
+            let sum = made.level.iter().zip(&made.reference);
+            channel.level = sum.map(|(force, zero)| force + zero).collect();
+        }
+        assert!(of_orders(0, cut, &fit, 2).is_empty());
+        let x = cut.channels[0].as_mut().unwrap();
+        x.level.iter_mut().for_each(|v| *v -= 2.0);
+        x.orders[2] += num_complex::Complex64::new(3.0, -4.0);
+        let y = cut.channels[1].as_mut().unwrap();
+        // An order off by 2.5 N is chance among ten thousand: 12.5 N² against sixteen times 2 N².
+        y.orders[1] += 2.5;
+        let lines = of_orders(0, cut, &fit, 2);
+        assert_eq!(lines.len(), 2);
+        let [mean, order] = [&lines[0], &lines[1]];
+        assert_eq!(
+            (mean.kind, mean.axis, mean.frequency_hz),
+            (LineKind::MeanForce, ForceAxis::X, 0.0)
+        );
+        approx::assert_relative_eq!(mean.amplitude, 2.0, max_relative = 1e-9);
+        approx::assert_relative_eq!(mean.mean_square, 4.0 - 1.0 / 6.0, max_relative = 1e-9);
+        assert_eq!(
+            (order.kind, order.axis, order.frequency_hz),
+            (LineKind::TurnHarmonic, ForceAxis::X, 150.0)
+        );
+        approx::assert_relative_eq!(order.amplitude, 10.0, max_relative = 1e-9);
+        approx::assert_relative_eq!(order.mean_square, 48.0, max_relative = 1e-9);
+    }
 }

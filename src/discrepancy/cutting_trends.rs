@@ -439,4 +439,132 @@ mod tests {
         });
         assert_eq!(found.against, Against::TimeInRecord, "{found:?}");
     }
+
+    use crate::identify::CuttingModel;
+    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned};
+    use approx::assert_relative_eq;
+
+    /// Forces 3 % larger than the model's, known to the noise over the force: of F N in n values of 1 N error each to 1/(F √n).
+    #[test]
+    fn the_excess_of_a_cut_is_a_share_of_its_force() {
+        let truth = turned(METAL, &[0.1]);
+        let model = CuttingModel::new(&truth, true).unwrap();
+        let fit = |data: &CuttingData| CuttingProblem { model: &model, data }.fits(&METAL).unwrap();
+        let larger = turned(METAL.map(|k| 1.03 * k), &[0.1]);
+        let fits = fit(&truth);
+        let (share, std) = excess_share(&larger.cuts[0], &fits[0]).unwrap();
+        assert_relative_eq!(share, 0.03, max_relative = 1e-6);
+        let force = |k: usize| 1.5 * (METAL[k] * 0.1 + METAL[k + 3]);
+        let square: f64 = (0..3).map(|k| force(k).powi(2)).sum();
+        assert_relative_eq!(std, 1.0 / (6.0 * square).sqrt(), max_relative = 1e-6);
+        let in_time = in_time(&larger, &fits);
+        assert_eq!(in_time.len(), 6);
+        for (k, point) in in_time.iter().enumerate() {
+            assert_relative_eq!(point.x, 0.1 * k as f64 + 0.05, epsilon = 1e-9);
+            assert_relative_eq!(point.rest, 0.03, max_relative = 1e-6);
+            assert_relative_eq!(point.std, 1.0 / square.sqrt(), max_relative = 1e-6);
+        }
+    }
+
+    /// Waves count by their noise: order 2 of x is larger by a tenth and known to 1 N, order 2 of y is right and known to 3 N.
+    #[test]
+    fn a_wave_counts_twice_its_power_over_its_noise() {
+        let data = milled(METAL, &MILLED[..1]);
+        let model = CuttingModel::new(&data, true).unwrap();
+        let mut fit = CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&METAL)
+        .unwrap()
+        .remove(0);
+        let alone = changed(&data, |cut| {
+            cut.channels[2] = None;
+            for (channel, (size, std)) in cut.channels.iter_mut().flatten().zip([(11.0, 1.0), (30.0, 3.0)]) {
+                channel.level.fill(0.0);
+                channel.orders = vec![Complex64::ZERO, Complex64::from_polar(size, 0.4)];
+                channel.order_std = vec![1.0, std];
+            }
+        });
+        for (made, size) in fit.channels.iter_mut().flatten().zip([10.0, 30.0]) {
+            made.level.fill(0.0);
+            made.zero.fill(0.0);
+            made.orders = vec![Complex64::ZERO, Complex64::from_polar(size, 0.4)];
+        }
+        // Σ 2 |C|²/σ² = 200 + 200, of which the first is a tenth too large.
+        let (share, std) = excess_share(&alone.cuts[0], &fit).unwrap();
+        assert_relative_eq!(share, 0.05, max_relative = 1e-9);
+        assert_relative_eq!(std, 0.05, max_relative = 1e-9);
+    }
+
+    /// A wave of 8 N over the pitch of two teeth, in cuts that began at different angles; drawn over the half turn of a tooth.
+    #[test]
+    fn a_ripple_of_the_teeth_is_drawn_over_their_pitch() {
+        let data = milled(METAL, &MILLED[..2]);
+        let model = CuttingModel::new(&data, true).unwrap();
+        let fits = CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&METAL)
+        .unwrap();
+        let mut rippled = data.clone();
+        for (cut, fit) in rippled.cuts.iter_mut().zip(&fits) {
+            let cut = std::sync::Arc::make_mut(cut);
+            for (channel, made) in cut
+                .channels
+                .iter_mut()
+                .flatten()
+                .zip(fit.channels.iter().flatten())
+            {
+                channel.orders.clone_from(&made.orders);
+            }
+            let y = cut.channels[1].as_mut().unwrap();
+            y.orders[1] += Complex64::from_polar(4.0, 0.5 - 2.0 * fit.placement);
+        }
+        let found = over_the_tooth(&rippled, &fits).unwrap();
+        assert_eq!(found.axis, Some(ForceAxis::Y));
+        // χ² of two cuts, 2 · (4 N / 1 N)² each, less one for each of 3 · 6 complex harmonics' parts.
+        assert_relative_eq!(found.explained, 64.0 - 36.0, max_relative = 1e-9);
+        // Noise known to 2 % may be 4 % of χ² larger.
+        let by_chance = ChiSquared::new(36.0).unwrap();
+        assert!(found.p_value > by_chance.sf(64.0) && found.p_value < by_chance.sf(60.0));
+        assert_eq!(found.points.len(), 36);
+        for (step, point) in found.points.iter().enumerate() {
+            let angle = 5.0 * step as f64;
+            assert_relative_eq!(point.x, angle, epsilon = 1e-9);
+            assert_relative_eq!(
+                point.rest,
+                8.0 * (2.0 * angle.to_radians() + 0.5).cos(),
+                epsilon = 1e-9
+            );
+            // Six harmonics of 1 N, each the mean of two cuts: 2 · 1 / 2 N² of the wave's variance.
+            assert_relative_eq!(point.std, 6f64.sqrt(), max_relative = 1e-9);
+        }
+    }
+
+    #[test]
+    fn points_at_one_abscissa_are_drawn_as_their_weighted_mean() {
+        let point = |x: f64, rest: f64, std: f64| TrendPoint { x, rest, std };
+        let drawn = means(
+            &[
+                point(2.0, 5.0, 1.0),
+                point(1.0, 1.0, 1.0),
+                point(1.0, 4.0, 2f64.sqrt()),
+                point(3.0, 0.0, 1.0),
+            ],
+            1.0,
+            2.0,
+        );
+        assert_eq!(drawn.len(), 3);
+        // Weights of 1 and ½.
+        assert_relative_eq!(drawn[0].rest, 2.0, max_relative = 1e-12);
+        assert_relative_eq!(drawn[0].std, 1.5f64.sqrt().recip(), max_relative = 1e-12);
+        assert_relative_eq!(drawn[1].rest, 5.0, max_relative = 1e-12);
+        // Many abscissae are drawn in eight stretches.
+        let many: Vec<TrendPoint> = (0..160).map(|i| point(f64::from(i), 1.0, 1.0)).collect();
+        let drawn = means(&many, 0.0, 159.0);
+        assert_eq!(drawn.len(), 8);
+        assert_relative_eq!(drawn[0].std, 20f64.sqrt().recip(), max_relative = 0.05);
+    }
 }

@@ -71,3 +71,66 @@ fn misfit(points: &[TrendPoint], degree: usize, place: &dyn Fn(f64) -> f64) -> O
     let solution = normal.cholesky()?.solve(&(basis.transpose() * &values));
     Some((values - basis * solution).norm_squared())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    fn points(values: &[(f64, f64)], std: f64) -> Vec<TrendPoint> {
+        values
+            .iter()
+            .map(|&(x, rest)| TrendPoint { x, rest, std })
+            .collect()
+    }
+
+    /// Slope of four points against chance by another library (scipy.stats.linregress: p = 0.146423993), whose scatter is far above
+    /// the noise; the F test of a line is the square of its t test.
+    #[test]
+    fn a_line_against_scatter_is_the_textbooks() {
+        let table = [
+            (4.52389, 2610.0),
+            (5.78053, 2580.0),
+            (7.037168, 2580.0),
+            (8.293805, 2480.0),
+        ];
+        // That line is over the doublings of the speed.
+        let over = table.map(|(speed, value): (f64, f64)| (speed.log2(), value));
+        let found = test(points(&over, 1.0), 1).unwrap();
+        assert_relative_eq!(found.p_value, 0.146423993, max_relative = 1e-6);
+        assert_relative_eq!(found.low, 4.52389f64.log2(), max_relative = 1e-12);
+        assert_relative_eq!(found.span, (8.293805f64 / 4.52389).log2(), max_relative = 1e-12);
+    }
+
+    /// Points that lie nearer to a line than their noise are no better known than that; three of them are too few to tell.
+    #[test]
+    fn scatter_below_the_noise_is_luck() {
+        let few = [(-1.0, -4.0), (0.0, 0.1), (1.0, 4.0)];
+        assert!(test(points(&few, 1.0), 1).is_none());
+        let four = [(-1.0, -4.0), (-1.0, -4.0), (1.0, 4.0), (1.0, 4.0)];
+        let found = test(points(&four, 1.0), 1).unwrap();
+        assert_relative_eq!(found.explained, 64.0, max_relative = 1e-9);
+        // F(1, 2) = t² with two degrees of freedom: P(|t| > 8) = 1 − 8/√66.
+        assert_relative_eq!(found.p_value, 1.0 - 8.0 / 66f64.sqrt(), max_relative = 1e-6);
+    }
+
+    /// At two speeds there is no parabola: a line is tested, whatever the distance of the two.
+    #[test]
+    fn two_abscissae_have_a_line_only() {
+        for span in [0.01, 0.5, 300.0] {
+            let two = [
+                (10.0, 1.0),
+                (10.0, 1.2),
+                (10.0 + span, 9.0),
+                (10.0 + span, 9.2),
+                (10.0 + span, 8.8),
+            ];
+            let found = test(points(&two, 0.2), 2).unwrap();
+            assert!(found.p_value < 1e-3, "{span}: {}", found.p_value);
+            let line = test(points(&two, 0.2), 1).unwrap();
+            assert_eq!(found.p_value, line.p_value);
+        }
+        let one = [(10.0, 1.0), (10.0, 1.2), (10.0, 9.0)];
+        assert!(test(points(&one, 0.2), 1).is_none());
+    }
+}

@@ -389,4 +389,13 @@ mod tests {
         after.error = 1.02;
         assert!(!is_progress(&before, &after, 1, 1.0));
     }
+
+    /// Of two folds that one is predicted worse is no progress, however much better the other is: their difference is as large as
+    /// its standard error.
+    #[test]
+    fn one_of_two_folds_that_gets_worse_is_no_progress() {
+        let before = errors(&[1000.0; 2]);
+        assert!(!is_progress(&before, &errors(&[800.0, 1030.0]), 1, 1.0));
+        assert!(is_progress(&before, &errors(&[800.0, 1005.0]), 1, 1.0));
+    }
 }

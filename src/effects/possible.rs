@@ -78,4 +78,10 @@ mod tests {
         );
         assert!(outside(size(2.5e-3, 1e-4)).unwrap().contains("more than 2000 µs"));
     }
+
+    #[test]
+    fn numbers_have_three_digits_that_say_something() {
+        let texts = [0.0123456, 1.5, 24.0, 123.456, 1234.4, -0.05].map(three_digits);
+        assert_eq!(texts, ["0.0123", "1.5", "24", "123", "1234", "-0.05"]);
+    }
 }

@@ -69,3 +69,77 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
     let gain = -here.gradient.dot(&step);
     (asked_for && size.iter().all(|t| t.is_finite())).then_some(LinearSize { theta: size, gain })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutting::waveform::DrillTerm;
+    use crate::effects::Registry;
+    use crate::identify::forces::cutting_data::CutKind;
+    use crate::identify::forces::cutting_study::calibrate_cutting;
+    use crate::identify::forces::made_cuts::{CONTACT_S, changed, drilled};
+    use crate::identify::{CuttingData, CuttingModel, CuttingProblem};
+
+    /// Holes whose wall rubs on the margins of the drill with `friction` N for each mm of depth.
+    fn holes(friction: f64) -> CuttingData {
+        let holes = [[0.2, 0.0], [0.3, 3.0], [0.4, 3.0]];
+        changed(&drilled([900.0, 30.0, 700.0, 45.0], &holes), |cut| {
+            let CutKind::Drilling { cut: hole, .. } = &cut.kind else {
+                unreachable!()
+            };
+            let channel = cut.channels[3].as_mut().unwrap();
+            channel.level_std.fill(0.01);
+            for (b, level) in channel.level.iter_mut().enumerate().take(cut.steady.end) {
+                let [from, to] = cut.block_s[b];
+                *level += friction * hole.mean(DrillTerm::Margin, from, to, CONTACT_S).0;
+            }
+        })
+    }
+
+    /// Friction adds to the torque: one step in its size finds all of it, and χ² falls by what it explains.
+    #[test]
+    fn the_size_of_an_effect_that_adds_is_found_in_one_step() {
+        for friction in [8.0, -5.0] {
+            let data = holes(friction);
+            let base = CuttingModel::new(&data, true).unwrap();
+            let margin = Registry::cutting().find(&(), "margin-friction")[0];
+            let model = base.with_effect(margin, &base.known(&data));
+            let theta = calibrate_cutting(&base, &data).unwrap().theta;
+            let without = CuttingProblem {
+                model: &base,
+                data: &data,
+            };
+            let without = without.cost(&theta).unwrap();
+            let problem = CuttingProblem {
+                model: &model,
+                data: &data,
+            };
+            let size = linear_size(&problem, &model, &theta).unwrap();
+            assert!(
+                (size.theta[4] / friction - 1.0).abs() < 0.02,
+                "{:?} for {friction}",
+                size.theta
+            );
+            // The cost is half of χ², and with the friction nothing is left of it.
+            assert!(
+                without > 100.0 && (size.gain / (2.0 * without) - 1.0).abs() < 0.02,
+                "{} {without}",
+                size.gain
+            );
+        }
+    }
+
+    #[test]
+    fn next_to_nothing_is_the_end_of_the_range_on_that_side() {
+        let data = holes(0.0);
+        let base = CuttingModel::new(&data, true).unwrap();
+        assert_eq!(faintest(&base), None);
+        let model = base.with_effect(
+            Registry::cutting().find(&(), "chisel-edge")[0],
+            &base.known(&data),
+        );
+        let faint = faintest(&model).unwrap();
+        let [low, _] = model.parameters[4].internal_bounds();
+        assert_eq!(faint, [low, model.parameters[5].internal(0.8)]);
+    }
+}

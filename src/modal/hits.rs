@@ -291,3 +291,52 @@ fn swells(response: &[f64], hit: usize) -> Option<usize> {
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1600 samples after the hit, a sine about an offset whose size is given by the segment of a hundred samples.
+    fn after_a_hit(size: impl Fn(usize) -> f64) -> Vec<f64> {
+        let quiet = vec![5.0; 40];
+        let ringing = (0..1600).map(|i| 5.0 + size(i / 100) * (i as f64).sin());
+        quiet.into_iter().chain(ringing).collect()
+    }
+
+    /// What dies out and comes back in the later part of a record was not the hit: another machine, a hand on the robot.
+    #[test]
+    fn a_response_that_comes_back_is_told_with_its_moment() {
+        let decaying = |k: usize| 0.5f64.powi(k as i32);
+        assert_eq!(swells(&after_a_hit(decaying), 40), None);
+        let comes_back = |size: f64| move |k: usize| if k >= 9 { size } else { decaying(k) };
+        assert_eq!(swells(&after_a_hit(comes_back(0.5)), 40), Some(900));
+        // A tenth of the hit, or what is not three times the quietest, is nothing.
+        assert_eq!(swells(&after_a_hit(comes_back(0.09)), 40), None);
+        assert_eq!(
+            swells(
+                &after_a_hit(|k| if k < 6 { 1.0 - 0.1 * k as f64 } else { 1.1 }),
+                40
+            ),
+            None
+        );
+        // Beats of close modes come back early.
+        let beats = |k: usize| [1.0, 0.05, 0.6, 0.1][k.min(3)];
+        assert_eq!(swells(&after_a_hit(beats), 40), None);
+        assert_eq!(swells(&[1.0; 100], 0), None);
+    }
+
+    #[test]
+    fn a_pulse_of_a_later_stretch_is_counted_from_the_beginning() {
+        let pulse = Pulse {
+            first: 10,
+            last: 14,
+            peak_at: 12,
+            peak_n: 300.0,
+        };
+        let later = pulse.later_by(100);
+        assert_eq!(
+            (later.first, later.last, later.peak_at, later.peak_n),
+            (110, 114, 112, 300.0)
+        );
+    }
+}

@@ -755,4 +755,38 @@ mod tests {
         };
         assert!(frfs(&silent).unwrap_err().to_string().contains("no hit"));
     }
+
+    /// Two hits of 2 N and answers H F ± e: the mean of H₁ forgets e, H₂ is larger by 1 + |e|²/|H F|², the coherence is the inverse of
+    /// that, and H_v lies between (Bendat and Piersol 2010, §6.1).
+    #[test]
+    fn estimators_take_noise_of_the_response_as_the_textbook_has_it() {
+        let h = Complex64::new(0.3, -0.4);
+        let noise = Complex64::new(-0.4, -0.3);
+        let block = |sign: f64| Block {
+            hit: 0,
+            force: vec![Complex64::from(2.0)],
+            responses: vec![vec![h * 2.0 + noise * sign]],
+        };
+        let blocks = [block(1.0), block(-1.0)];
+        let blocks: Vec<&Block> = blocks.iter().collect();
+        // |e|² = 0.25 N² of |H F|² = 1.
+        for (estimator, factor) in [
+            (Estimator::H1, 1.0),
+            (Estimator::H2, 1.25),
+            (Estimator::Hv, 1.25f64.sqrt()),
+        ] {
+            let (found, coherence) = average(&blocks, 0, 1, estimator);
+            assert!((found[0] - h * factor).norm() < 1e-12, "{found:?}");
+            approx::assert_relative_eq!(coherence[0], 0.8, max_relative = 1e-12);
+        }
+        let silent = Block {
+            hit: 0,
+            force: vec![Complex64::ZERO],
+            responses: vec![vec![Complex64::ZERO]],
+        };
+        assert_eq!(
+            average(&[&silent], 0, 1, Estimator::H2),
+            (vec![Complex64::ZERO], vec![0.0])
+        );
+    }
 }

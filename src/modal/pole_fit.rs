@@ -116,4 +116,29 @@ mod tests {
         let h = [Complex64::ONE; 3];
         assert!(PoleFit::of(&lines, &h, &[1.0; 3], &[(2.0, 0.01)]).is_err());
     }
+
+    /// Constants under noise scatter by what is stated of their real and their imaginary part.
+    #[test]
+    fn stated_errors_are_the_scatter_under_noise() {
+        use crate::modal::synthetic::{Synthetic, SyntheticMode};
+        let modes = [
+            SyntheticMode::new(18.0, 0.02, 0.5),
+            SyntheticMode::new(19.5, 0.03, -0.2),
+        ];
+        let fits: Vec<(Complex64, f64)> = (0..200)
+            .map(|seed| {
+                let (f, h) = Synthetic::new(14.0, 24.0, 0.1, &modes)
+                    .with_noise(0.05, 0.0, seed)
+                    .frf();
+                let weights = vec![1e3; f.len()];
+                PoleFit::of(&f, &h, &weights, &[(18.0, 0.02), (19.5, 0.03)])
+                    .unwrap()
+                    .constants[1]
+            })
+            .collect();
+        let square = fits.iter().map(|(c, _)| (c + 0.2).norm_sqr()).sum::<f64>() / 200.0;
+        let stated = (fits.iter().map(|f| f.1 * f.1).sum::<f64>() / 200.0).sqrt();
+        let ratio = stated / (0.5 * square).sqrt();
+        assert!((0.85..1.18).contains(&ratio), "{ratio}");
+    }
 }

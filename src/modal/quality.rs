@@ -431,4 +431,59 @@ mod tests {
             assert!(quality.reasons[0].contains(expected), "{quality:?}");
         }
     }
+
+    /// As mobility a line at 4 Hz counts sixteen times that at 1 Hz: off by 0.2 there, of 1 and 1.2, the mirrored FRF is off by
+    /// √(16 · 0.04 / (14 + 8 · 2.44)).
+    #[test]
+    fn reciprocity_is_judged_as_mobility_and_coherence_by_the_size_of_the_line() {
+        let good = fit(0.03, 0.03, 1.0);
+        let mut mirror = good.clone();
+        mirror.measured_m_per_n[3] = Complex64::new(1.0, 0.0) * 1.2;
+        let h = [1.0, 2.0, 2.0, 0.0].map(Complex64::from);
+        let quality = judge(
+            &[1.0, 2.0, 3.0, 4.0],
+            &h,
+            Some(&[1.0, 0.5, 0.0, 0.9]),
+            Some(&good),
+            Some(&mirror),
+        );
+        approx::assert_relative_eq!(
+            quality.reciprocity_nrms.unwrap(),
+            (0.64f64 / 33.52).sqrt(),
+            max_relative = 1e-12
+        );
+        // (1 · 1 + 4 · ½ + 4 · 0) / 9
+        approx::assert_relative_eq!(quality.coherence.unwrap(), 1.0 / 3.0, max_relative = 1e-12);
+        let beyond = (0.64f64 / 33.52 - 2.0 * 0.0009).sqrt();
+        let said = format!("reciprocity fails by {:.0} %", 100.0 * beyond);
+        assert!(quality.reasons.contains(&said), "{quality:?}");
+    }
+
+    #[test]
+    fn powers_are_those_of_mobility() {
+        let mut power = Power::default();
+        let left = [
+            Complex64::new(1.0, 0.0),
+            Complex64::new(0.0, 1.0),
+            Complex64::new(0.0, -2.0),
+        ];
+        for _ in 0..2 {
+            power.add((0..3).map(|k| (1.0 + k as f64, Complex64::from(3.0), left[k], 0.5)));
+        }
+        // Twice: Σ f² |H|², Σ f² |left|², Σ f² σ², and 2i · (−6i)* of the second line with the third.
+        let expected = [
+            2.0 * 9.0 * 14.0,
+            2.0 * (1.0 + 4.0 + 36.0),
+            2.0 * 0.25 * 14.0,
+            2.0 * -12.0,
+        ];
+        let found = [power.measured, power.left, power.noise, power.coloured];
+        for (found, expected) in found.iter().zip(expected) {
+            approx::assert_relative_eq!(*found, expected, max_relative = 1e-12);
+        }
+        let beyond: Vec<(f64, f64)> = [(1.0, 0.75), (2.0, 3.0), (3.0, 9.0 * 3.75)]
+            .map(|(f, b)| (f, 2.0 * b))
+            .into();
+        assert_eq!(power.beyond_noise, beyond);
+    }
 }

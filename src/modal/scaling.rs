@@ -256,4 +256,25 @@ mod tests {
         assert_eq!(apart.no_antiresonance_between_hz, [[10.0, 20.0], [20.0, 35.0]]);
         assert!(apart.verdict.contains("not quite"), "{apart:?}");
     }
+
+    /// A modal mass is known as well as the driving point's constant: to 1 % here. The point beside it is three times as mobile.
+    #[test]
+    fn a_modal_mass_is_as_certain_as_its_driving_point() {
+        let constants = [
+            Some((Complex64::from(0.5), 0.005)),
+            Some((Complex64::from(1.5), 0.1)),
+        ];
+        let found = scaled(10.0, 0.01, &constants, &[Some([0, 0]), Some([1, 0])]).unwrap();
+        // φ₀² = 0.5, φ₁ = 3 φ₀.
+        approx::assert_relative_eq!(found.modal_mass_kg, 1.0 / 4.5, max_relative = 1e-12);
+        approx::assert_relative_eq!(found.modal_mass_std_kg, 0.01 / 4.5, max_relative = 1e-12);
+    }
+
+    /// Mobilities of 1 and −3: nine tenths of the power come back out.
+    #[test]
+    fn power_that_comes_back_is_a_share_of_the_mobility() {
+        let of = |mobility: f64, f: f64| Complex64::from(mobility) / Complex64::new(0.0, TAU * f);
+        let found = check_driving_point("a", &[2.0, 5.0], &[of(1.0, 2.0), of(-3.0, 5.0)], &[]);
+        approx::assert_relative_eq!(found.negative_power_share, 0.9, max_relative = 1e-12);
+    }
 }

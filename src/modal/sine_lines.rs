@@ -249,4 +249,40 @@ mod tests {
             }
         }
     }
+
+    /// Hum no larger than the FRF itself, on the flank of a resonance, where a straight line through the neighbours is far off; it
+    /// leaks upwards only, as a sine between two lines does.
+    #[test]
+    fn hum_on_a_steep_flank_is_found_with_the_lines_it_spoils() {
+        let mut frequency = Vec::new();
+        let frfs: Vec<Vec<Complex64>> = (0..6)
+            .map(|k| {
+                let modes = [
+                    SyntheticMode::new(60.0, 0.01, 1.0),
+                    SyntheticMode::new(108.0, 0.01, 1.0),
+                ];
+                let (f, mut h) = Synthetic::new(5.0, 200.0, 0.5, &modes)
+                    .with_noise(0.0, 0.01, k)
+                    .frf();
+                let at = f.iter().position(|f| *f == 100.0).unwrap();
+                let size = h[at].norm();
+                for (line, share) in [(at, 1.0), (at + 1, 0.8)] {
+                    h[line] += Complex64::from_polar(size * share, k as f64);
+                }
+                frequency = f;
+                h
+            })
+            .collect();
+        let found = sine_lines(&frequency, &frfs.iter().map(|h| h.as_slice()).collect::<Vec<_>>());
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(found[0].frequency_hz, 100.0);
+        assert!(
+            found[0].spoils_hz[0] <= 100.0 && found[0].spoils_hz[0] > 99.0,
+            "{found:?}"
+        );
+        assert!(
+            found[0].spoils_hz[1] >= 100.5 && found[0].spoils_hz[1] < 101.5,
+            "{found:?}"
+        );
+    }
 }

@@ -188,3 +188,184 @@ pub(crate) fn air_notices(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cutting::measured::cut_analysis::{Average, Trace, TurnAverage};
+
+    /// Samples at 100 Hz of what the closure says of the time, s: a cut of `cut_s` between air.
+    fn record(seconds: f64, value: impl Fn(f64) -> f64) -> Vec<f64> {
+        let samples = (100.0 * seconds) as usize;
+        (0..samples).map(|i| value(i as f64 / 100.0)).collect()
+    }
+
+    fn believed(
+        values: &[f64],
+        air: [Option<Range<usize>>; 2],
+        process: Process,
+    ) -> (Air, bool, Vec<&'static str>) {
+        let [before, after] = air;
+        let mut notices = Vec::new();
+        let axis = if process == Process::Drilling {
+            ForceAxis::Z
+        } else {
+            ForceAxis::X
+        };
+        let (air, short) = believable_air(
+            &[(axis, values)],
+            100.0,
+            0.0,
+            &Air { before, after },
+            &(200..400),
+            process,
+            0.05,
+            &mut notices,
+        );
+        (air, short, notices.iter().map(|n| n.kind).collect())
+    }
+
+    /// A second of air, the cut from 2 s to 4 s at 200 N: a zero that would be off by 100 N in the middle, 2.5 s on, is no zero.
+    #[test]
+    fn air_that_would_carry_the_zero_off_by_half_the_force_is_none() {
+        let at = |slope: f64| {
+            let values = record(4.0, |t| if t < 1.0 { slope * (t - 0.5) } else { 200.0 });
+            let (air, short, notices) = believed(&values, [Some(0..100), None], Process::Turning);
+            assert!(!short);
+            assert_eq!(notices.is_empty(), air.before.is_some());
+            air.before.is_some()
+        };
+        assert!(at(0.0) && at(38.0) && at(-38.0));
+        assert!(!at(43.0) && !at(-43.0));
+    }
+
+    /// The same slope, of a zero that really drifts: the air after the cut lies where the line goes on to.
+    #[test]
+    fn air_on_the_other_side_bears_a_steep_drift_out() {
+        let drift = |t: f64| 60.0 * (t - 0.5);
+        let both = [Some(0..100), Some(500..600)];
+        let values = record(6.0, |t| {
+            drift(t) + if (2.0..4.0).contains(&t) { 200.0 } else { 0.0 }
+        });
+        let (air, _, notices) = believed(&values, both.clone(), Process::Turning);
+        assert!(air.before.is_some() && air.after.is_some() && notices.is_empty());
+        // A tool that is going in: the air after the cut knows nothing of it.
+        let values = record(6.0, |t| match t {
+            t if t < 1.0 => drift(t),
+            t if (2.0..4.0).contains(&t) => 200.0,
+            _ => 0.0,
+        });
+        let (air, _, notices) = believed(&values, both.clone(), Process::Turning);
+        assert_eq!((air.before, air.after), (None, Some(500..600)));
+        assert_eq!(notices, [NO_DRIFT]);
+        // A mill shows by its teeth that it does not cut.
+        let (air, _, notices) = believed(&values, both, Process::Milling);
+        assert!(air.before.is_some() && notices.is_empty());
+    }
+
+    /// Milling: a slope is doubted where it is carried more than three times the length of its air.
+    #[test]
+    fn a_mills_air_is_doubted_where_it_is_carried_far() {
+        let kept = |air: Range<usize>| {
+            let middle = 0.01 * (air.start as f64 + 0.5 * air.len() as f64);
+            let values = record(4.0, |t| if t < 1.9 { 90.0 * (t - middle) } else { 200.0 });
+            believed(&values, [Some(air), None], Process::Milling)
+                .0
+                .before
+                .is_some()
+        };
+        // From 0.5 s to the middle at 3 s are 2.5 s: two and a half lengths of one second, five of half a second.
+        assert!(kept(0..100));
+        assert!(!kept(25..75));
+    }
+
+    /// Four turns of air, 2.9 s before the middle of the cut: more than twelve times their length. Their mean is the zero.
+    #[test]
+    fn the_slope_of_a_few_turns_is_not_carried_far() {
+        let values = record(4.0, |t| if t < 1.0 { 0.0 } else { 200.0 });
+        let short = |air: Range<usize>| believed(&values, [Some(air), None], Process::Turning).1;
+        assert!(short(0..20));
+        assert!(!short(0..30) && !short(0..60));
+    }
+
+    fn channel(axis: ForceAxis, value: f64, change: impl Fn(&mut DriftLine)) -> ChannelAnalysis {
+        let mut drift = fit_drift(&[], 100.0, 0.0, &Air::default());
+        change(&mut drift);
+        ChannelAnalysis {
+            name: String::new(),
+            axis,
+            drift,
+            mean: TurnAverage {
+                average: Average {
+                    value,
+                    std_error: 1.0,
+                },
+                turns: 10,
+                turn_std: Some(1.0),
+                zero_std: 0.0,
+                dropped: 0,
+            },
+            trace: Trace {
+                time_s: Vec::new(),
+                min: Vec::new(),
+                max: Vec::new(),
+            },
+        }
+    }
+
+    fn told(channels: &[ChannelAnalysis]) -> Vec<&'static str> {
+        let mut notices = Vec::new();
+        let air = Air {
+            before: Some(0..10),
+            after: Some(20..30),
+        };
+        air_notices(&air, &channels.iter().collect::<Vec<_>>(), 4.0, &mut notices);
+        notices.iter().map(|n| n.kind).collect()
+    }
+
+    /// Over a record of 4 s: three quarters of 200 N are 37.5 N/s. The torque is no force to compare with.
+    #[test]
+    fn a_zero_that_drifts_far_is_told() {
+        let steep = |axis, slope: f64, std: f64| {
+            channel(axis, 20.0, move |d| {
+                (d.slope_per_s, d.slope_std_per_s) = (slope, std)
+            })
+        };
+        let large = || channel(ForceAxis::Z, 200.0, |_| ());
+        assert!(told(&[large(), steep(ForceAxis::X, 36.0, 1.0)]).is_empty());
+        assert_eq!(told(&[large(), steep(ForceAxis::X, -39.0, 1.0)]), [STEEP_DRIFT]);
+        // One that six standard deviations do not tell from none is not.
+        assert!(told(&[large(), steep(ForceAxis::X, 39.0, 7.0)]).is_empty());
+        assert_eq!(told(&[large(), steep(ForceAxis::X, 39.0, 6.0)]), [STEEP_DRIFT]);
+        // 20 N·m of torque and 4 N·m/s.
+        assert_eq!(told(&[large(), steep(ForceAxis::Mz, 4.0, 0.1)]), [STEEP_DRIFT]);
+        assert!(told(&[large(), steep(ForceAxis::Mz, 3.6, 0.1)]).is_empty());
+    }
+
+    /// A bend of more than 2 % of the mean force, and a zero that jumped.
+    #[test]
+    fn a_zero_that_bends_or_jumps_is_told() {
+        let bent = |bend: f64| {
+            channel(ForceAxis::X, -200.0, move |d| {
+                (d.bend, d.slope_per_s) = (bend, 60.0)
+            })
+        };
+        assert_eq!(told(&[bent(4.4)]), [BENT_DRIFT]);
+        // As a line it is steep.
+        assert_eq!(told(&[bent(3.6)]), [STEEP_DRIFT]);
+        assert_eq!(
+            told(&[channel(ForceAxis::X, 200.0, |d| d.step = -5.0)]),
+            [MOVED_ZERO]
+        );
+        let mut notices = Vec::new();
+        for (before, after) in [(false, false), (false, true), (true, false), (true, true)] {
+            let air = Air {
+                before: before.then_some(0..10),
+                after: after.then_some(20..30),
+            };
+            air_notices(&air, &[], 4.0, &mut notices);
+        }
+        let kinds: Vec<&str> = notices.iter().map(|n| n.kind).collect();
+        assert_eq!(kinds, [NO_AIR, NO_AIR_BEFORE, NO_AIR_AFTER]);
+    }
+}

@@ -146,3 +146,56 @@ pub(crate) fn in_tool_axes(
     averages[ForceAxis::Mz.index()] = recorded(ForceAxis::Mz);
     averages
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::signal::{Air, fit_drift};
+    use approx::assert_relative_eq;
+
+    fn channel(axis: ForceAxis, value: f64, std_error: f64) -> ChannelAnalysis {
+        ChannelAnalysis {
+            name: String::new(),
+            axis,
+            drift: fit_drift(&[], 100.0, 0.0, &Air::default()),
+            mean: TurnAverage {
+                average: Average { value, std_error },
+                turns: 10,
+                turn_std: Some(1.0),
+                zero_std: 0.0,
+                dropped: 0,
+            },
+            trace: Trace {
+                time_s: Vec::new(),
+                min: Vec::new(),
+                max: Vec::new(),
+            },
+        }
+    }
+
+    /// A dynamometer turned by 30° about z: 100 N along its x and 50 N along its y, each known to 3 N and 4 N.
+    #[test]
+    fn forces_turn_as_vectors_and_their_errors_add_in_squares() {
+        let (s, c) = (0.5, 0.75f64.sqrt());
+        let turned = [[c, -s, 0.0], [s, c, 0.0], [0.0, 1e-12, 1.0]];
+        let mut channels = vec![
+            channel(ForceAxis::X, 100.0, 3.0),
+            channel(ForceAxis::Y, 50.0, 4.0),
+            channel(ForceAxis::Mz, 7.0, 0.1),
+        ];
+        let [x, y, z, torque] = in_tool_axes(&turned, &channels);
+        assert_relative_eq!(x.unwrap().value, 100.0 * c - 50.0 * s, max_relative = 1e-12);
+        assert_relative_eq!(y.unwrap().value, 100.0 * s + 50.0 * c, max_relative = 1e-12);
+        assert_relative_eq!(
+            x.unwrap().std_error,
+            (9.0 * 0.75 + 16.0 * 0.25f64).sqrt(),
+            max_relative = 1e-12
+        );
+        assert_eq!((z, torque.map(|t| t.value)), (None, Some(7.0)));
+        // Without y there is no x of the tool; rounding of the matrix needs no channel.
+        channels.remove(1);
+        channels.push(channel(ForceAxis::Z, 20.0, 1.0));
+        let [x, y, z, _] = in_tool_axes(&turned, &channels);
+        assert_eq!((x, y, z.map(|z| z.value)), (None, None, Some(20.0)));
+    }
+}

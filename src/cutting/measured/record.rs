@@ -623,4 +623,270 @@ mod tests {
         }
         assert!(!is_noise(&[]));
     }
+
+    use crate::cutting::made_tools::{drill, endmill};
+    use crate::data::{Channel, Immersion};
+    use approx::assert_relative_eq;
+    use std::f64::consts::TAU;
+
+    const RATE_HZ: f64 = 2000.0;
+    const AS_IT_IS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+    /// `seconds` of x, y, z and torque at 2 kHz with noise of 1 N and a zero that rises from 5 N by 1 N/s.
+    fn record(seconds: f64, seed: u64, force: impl Fn(f64) -> [f64; 4]) -> TimeRecord {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let roles = [
+            ChannelRole::ForceX,
+            ChannelRole::ForceY,
+            ChannelRole::ForceZ,
+            ChannelRole::TorqueZ,
+        ];
+        let mut channels = roles.map(|role| Channel {
+            name: format!("{role:?}"),
+            file_unit: "N".into(),
+            role,
+            samples: Vec::new(),
+        });
+        for i in 0..(seconds * RATE_HZ) as usize {
+            let t = i as f64 / RATE_HZ;
+            for (channel, value) in channels.iter_mut().zip(force(t)) {
+                let noise = crate::statistics::nearly_normal(&mut random);
+                channel.samples.push(value + 5.0 + t + noise);
+            }
+        }
+        TimeRecord {
+            sample_rate_hz: RATE_HZ,
+            start_s: 10.0,
+            channels: channels.into(),
+            filled: Vec::new(),
+        }
+    }
+
+    fn cut(geometry: CutGeometry) -> Cut {
+        Cut {
+            id: "a".into(),
+            file: "a.csv".into(),
+            spindle_rpm: 1200.0,
+            geometry,
+            order: None,
+            steady_s: None,
+            material: None,
+            outcome: None,
+            posture: None,
+            line: 1,
+        }
+    }
+
+    fn read(tool: &Tool, cut: &Cut, dyno: &[[f64; 3]; 3], record: &TimeRecord) -> CutAnalysis {
+        let trials = CuttingTrials {
+            tool,
+            cuts: std::slice::from_ref(cut),
+            tool_from_dyno: dyno,
+            material: None,
+            orthogonal: None,
+        };
+        analyse_cut(&trials, 0, record).unwrap()
+    }
+
+    fn kinds(analysis: &CutAnalysis) -> Vec<&'static str> {
+        analysis.notices.iter().map(|n| n.kind).collect()
+    }
+
+    /// From 1 s to 4 s of 5 s.
+    fn cutting(t: f64) -> bool {
+        (1.0..4.0).contains(&t)
+    }
+
+    /// A bar of 40 mm turned at 1200 1/min: 151 m/min, and forces above a zero that drifts by 3 N while it cuts.
+    #[test]
+    fn a_turned_cut_is_read_with_its_air_and_its_means() {
+        let bar = cut(CutGeometry::Turning {
+            feed_per_rev_mm: 0.2,
+            depth_of_cut_mm: 1.5,
+            diameter_mm: 40.0,
+        });
+        let force = [300.0, 150.0, 900.0, 0.0];
+        let record = record(5.0, 1, |t| if cutting(t) { force } else { [0.0; 4] });
+        let analysis = read(&endmill(0.4, 95.0), &bar, &AS_IT_IS, &record);
+        assert_relative_eq!(analysis.cutting_speed_m_per_min, 150.8, max_relative = 1e-3);
+        assert_eq!((analysis.feed_mm, analysis.record_s), (0.2, [10.0, 15.0]));
+        for (average, truth) in analysis.averages.iter().zip(force).take(3) {
+            let average = average.unwrap();
+            assert!(
+                (average.value - truth).abs() < 5.0 * average.std_error,
+                "{average:?} for {truth}"
+            );
+            // 1 N of noise over some 3 s, and the line through 2 s of air.
+            assert!((0.008..0.1).contains(&average.std_error), "{average:?}");
+        }
+        let ([_, before], [after, _]) = (analysis.air_before_s.unwrap(), analysis.air_after_s.unwrap());
+        let [from, to] = analysis.steady_s;
+        assert!(
+            before > 10.8 && before <= 11.0 && (14.0..14.2).contains(&after),
+            "{before} {after}"
+        );
+        assert!(
+            (11.0..11.3).contains(&from) && (13.7..14.01).contains(&to),
+            "{from} {to}"
+        );
+        assert_relative_eq!(analysis.revolutions, 20.0 * (to - from), max_relative = 1e-9);
+        assert!(kinds(&analysis).is_empty(), "{:?}", analysis.notices);
+        // Middles and ends of the stretches that are drawn: ten samples each.
+        let trace = &analysis.channels[0].trace;
+        assert_eq!(trace.time_s.len(), 1000);
+        assert_relative_eq!(trace.time_s[100], 10.0 + 1004.5 / RATE_HZ, max_relative = 1e-12);
+        let samples = &record.channels[0].samples[1000..1010];
+        assert_eq!(trace.max[100], samples.iter().copied().fold(f64::MIN, f64::max));
+        assert_eq!(trace.min[100], samples.iter().copied().fold(f64::MAX, f64::min));
+    }
+
+    /// A force that grows by a quarter while it cuts, and one of a mean near zero whose ripple does.
+    #[test]
+    fn a_cut_that_changes_is_told() {
+        let bar = cut(CutGeometry::Turning {
+            feed_per_rev_mm: 0.2,
+            depth_of_cut_mm: 1.5,
+            diameter_mm: 40.0,
+        });
+        let told = |growth: f64| {
+            let factor = move |t: f64| 1.0 + growth * (t - 1.0) / 3.0;
+            let record = record(5.0, 2, |t| {
+                if cutting(t) {
+                    [300.0, 150.0, 900.0, 0.0].map(|f| f * factor(t))
+                } else {
+                    [0.0; 4]
+                }
+            });
+            let analysis = read(&endmill(0.4, 95.0), &bar, &AS_IT_IS, &record);
+            analysis
+                .notices
+                .iter()
+                .find(|n| n.kind == UNSTEADY_CUT)
+                .map(|n| n.detail.clone())
+        };
+        // The last third against the first: two thirds of the growth.
+        assert_eq!(told(0.3).as_deref(), Some("by +17 %"));
+        assert_eq!(told(0.1), None);
+    }
+
+    /// A slot milled by two teeth of a straight edge; `share`: of the common chip that each tooth takes.
+    fn milled(share: [f64; 2]) -> impl Fn(f64) -> [f64; 4] {
+        move |t| {
+            if !cutting(t) {
+                return [0.0; 4];
+            }
+            let mut force = [0.0; 4];
+            for (tooth, share) in share.iter().enumerate() {
+                let phi = (TAU * (20.0 * t + 0.5 * tooth as f64)).rem_euclid(TAU);
+                if phi < std::f64::consts::PI {
+                    let (tangential, radial) =
+                        (1600.0 * 0.1 * share * phi.sin(), 500.0 * 0.1 * share * phi.sin());
+                    force[0] -= tangential * phi.cos() + radial * phi.sin();
+                    force[1] += tangential * phi.sin() - radial * phi.cos();
+                    force[2] += 0.3 * tangential;
+                }
+            }
+            force
+        }
+    }
+
+    /// A missing tooth leaves its chip to the other; on a dynamometer that lies the other way round it is missing as well.
+    #[test]
+    fn a_tooth_that_does_not_cut_is_told_whatever_way_the_dynamometer_lies() {
+        let slot = cut(CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        });
+        let mut tool = endmill(0.0, 90.0);
+        tool.helix_deg = 0.0;
+        // Recorded x is the tool's y, recorded y its −x.
+        let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], AS_IT_IS[2]];
+        for share in [[1.0, 1.0], [0.0, 2.0]] {
+            let made = milled(share);
+            let plain = read(&tool, &slot, &AS_IT_IS, &record(5.0, 3, &made));
+            let other = read(
+                &tool,
+                &slot,
+                &turned,
+                &record(5.0, 3, |t| {
+                    let [x, y, z, m] = made(t);
+                    [y, -x, z, m]
+                }),
+            );
+            for analysis in [plain, other] {
+                let idle = analysis.notices.iter().find(|n| n.kind == IDLE_TOOTH);
+                match share[0] {
+                    0.0 => assert_eq!(idle.unwrap().detail, "100 % of what a missing tooth makes"),
+                    _ => assert!(analysis.notices.is_empty(), "{:?}", analysis.notices),
+                }
+                // Of a slot: the mean of y is N a c K_t / 4, that of x minus N a c K_r / 4; N = 2, a K_t = 1600 N/mm.
+                let mean = |axis: usize| analysis.averages[axis].unwrap().value;
+                assert_relative_eq!(mean(1), 80.0, max_relative = 0.01);
+                assert_relative_eq!(mean(0), -25.0, max_relative = 0.01);
+            }
+        }
+    }
+
+    /// A hole 14 mm deep at 4 mm/s, its entry of 1.6 mm included, takes 3.9 s.
+    #[test]
+    fn a_hole_that_takes_another_time_is_told() {
+        let told = |depth: f64, seconds: f64| {
+            let hole = cut(CutGeometry::Drilling {
+                feed_per_rev_mm: 0.2,
+                pilot_diameter_mm: 0.0,
+                hole_depth_mm: Some(depth),
+            });
+            let record = record(seconds + 2.0, 4, |t| {
+                let part = ((t - 1.0) / 0.4).clamp(0.0, 1.0);
+                let part = if t < 1.0 + seconds { part } else { 0.0 };
+                [0.0, 0.0, 800.0 * part, 60.0 * part]
+            });
+            kinds(&read(&drill(), &hole, &AS_IT_IS, &record)).contains(&WRONG_DURATION)
+        };
+        assert!(!told(14.0, 3.9));
+        // A dwell at the bottom is usual, half the time again is not; nor is a hole that is over too early.
+        assert!(!told(14.0, 5.0));
+        assert!(told(14.0, 6.3));
+        assert!(told(14.0, 3.2));
+    }
+
+    /// Where the steady cut is given, in times of the record, it is taken in whole turns; where it is not in the record, refused.
+    #[test]
+    fn a_steady_window_that_is_given_is_taken() {
+        let mut bar = cut(CutGeometry::Turning {
+            feed_per_rev_mm: 0.2,
+            depth_of_cut_mm: 1.5,
+            diameter_mm: 40.0,
+        });
+        let record = record(5.0, 1, |t| {
+            if cutting(t) {
+                [300.0, 150.0, 900.0, 0.0]
+            } else {
+                [0.0; 4]
+            }
+        });
+        bar.steady_s = Some([12.0, 13.02]);
+        let tool = endmill(0.4, 95.0);
+        let analysis = read(&tool, &bar, &AS_IT_IS, &record);
+        assert!(analysis.steady_given);
+        assert_relative_eq!(
+            analysis.steady_s[1] - analysis.steady_s[0],
+            1.0,
+            max_relative = 1e-9
+        );
+        assert_relative_eq!(analysis.revolutions, 20.0, max_relative = 1e-9);
+        bar.steady_s = Some([12.0, 12.2]);
+        let short = read(&tool, &bar, &AS_IT_IS, &record);
+        assert_eq!(kinds(&short), [SHORT_WINDOW]);
+        bar.steady_s = Some([14.0, 16.0]);
+        let trials = CuttingTrials {
+            tool: &tool,
+            cuts: &[bar],
+            tool_from_dyno: &AS_IT_IS,
+            material: None,
+            orthogonal: None,
+        };
+        assert!(analyse_cut(&trials, 0, &record).is_err());
+    }
 }

@@ -296,6 +296,15 @@ mod tests {
         }
     }
 
+    /// Six teeth of a tool off its axis by three quarters of what makes one idle: all still cut.
+    #[test]
+    fn a_large_runout_of_many_teeth_is_no_idle_tooth() {
+        let share: Vec<f64> = (0..6)
+            .map(|j| 1.0 + 0.75 * (TAU * f64::from(j) / 6.0).cos())
+            .collect();
+        assert_eq!(told(&cut(6, 0.0, 180.0), &share, None), None);
+    }
+
     #[test]
     fn an_unknown_zero_does_not_hide_it() {
         let cut = cut(3, 120.0, 180.0);

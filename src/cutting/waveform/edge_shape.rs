@@ -192,4 +192,18 @@ mod tests {
         let here = shape.immersion_at(height(0.5), half).unwrap();
         assert!((here.start_rad - FRAC_PI_2).abs() < 1e-12);
     }
+
+    /// A corner of 1 mm that goes over into an edge of 60°: they touch where the circle has that slope, half a millimetre up, and the
+    /// edge leans outwards from there.
+    #[test]
+    fn a_corner_goes_over_smoothly_into_a_leaning_edge() {
+        let shape = EdgeShape::of(&tool(1.0, 60.0)).unwrap();
+        let touches = 5.0 + 60f64.to_radians().sin();
+        assert!((shape.radius_at(0.5) - touches).abs() < 1e-12);
+        assert!((shape.radius_at(0.1) - (5.0 + 0.19f64.sqrt())).abs() < 1e-12);
+        assert!((shape.radius_at(2.0) - (touches + 1.5 / 3f64.sqrt())).abs() < 1e-12);
+        let slices = shape.slices(2.0, Immersion::SLOT);
+        let length = 60f64.to_radians() + 1.5 / 60f64.to_radians().sin();
+        assert!((sum(&slices, EdgeSlice::length_mm) - length).abs() < 1e-9);
+    }
 }

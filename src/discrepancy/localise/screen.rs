@@ -282,4 +282,35 @@ mod tests {
         let spring = resonator_stiffness(2700.0, 27.0, 0.0);
         assert!((spring.re / (std::f64::consts::TAU * 27.0).powi(2) - 1.0).abs() < 1e-3);
     }
+
+    /// Lines that say a thousand times less, however far off they are, change nothing; starts are places apart.
+    #[test]
+    fn uncertain_lines_do_not_hide_a_resonator() {
+        let curve: Vec<CurvePoint> = (0..400)
+            .map(|i| {
+                let f = 4.0 + 0.2 * f64::from(i);
+                let astray = i % 3 == 0;
+                CurvePoint {
+                    frequency_hz: f,
+                    stiffness: if astray {
+                        Complex64::new(-4e6, 0.0)
+                    } else {
+                        5.0 * resonator_stiffness(f, 27.0, 0.04)
+                    },
+                    std: if astray { 1e7 } else { 1e3 },
+                }
+            })
+            .collect();
+        let starts = resonators(&curve, 3);
+        assert!(
+            (starts[0][1] / 27.0 - 1.0).abs() < 0.03 && (starts[0][0] / 5.0 - 1.0).abs() < 0.3,
+            "{starts:?}"
+        );
+        for (k, start) in starts.iter().enumerate() {
+            assert!(
+                starts[..k].iter().all(|s| (s[1] / start[1] - 1.0).abs() > 0.1),
+                "{starts:?}"
+            );
+        }
+    }
 }

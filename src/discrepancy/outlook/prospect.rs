@@ -133,6 +133,12 @@ mod tests {
             alike.repeated(3.0).growth(&DMatrix::from_element(1, 1, 6.0)),
             max_relative = 1e-12
         );
+        // A rival that predicts what is there has nothing to lose.
+        let same = real([3.0; 4]);
+        assert_eq!(
+            Prospect::of_frf(&same, &noise, &frf(same.clone()), 1.0).square,
+            0.0
+        );
         let mut both = alike.clone();
         both.add(&wavy);
         assert_relative_eq!(both.square, 36.0, max_relative = 1e-12);

@@ -268,3 +268,167 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
     let taken = share_taken(16, FrfGroup::ALL, &[3.0]);
     assert!(taken < 0.7, "{taken}");
 }
+
+/// Two postures and every sixth line: enough to see what a mistake does to a file.
+fn few(model: &StructureModel) -> FrfData {
+    let mut data = arrangement(model).filtered(|posture| posture < 2);
+    for block in &mut data.blocks {
+        let block = Arc::make_mut(block);
+        block.frequency_hz = block.frequency_hz.iter().copied().step_by(6).collect();
+        for frf in &mut block.frfs {
+            frf.receptance.truncate(block.frequency_hz.len());
+            frf.noise_std.truncate(block.frequency_hz.len());
+        }
+    }
+    data
+}
+
+/// Curves with the mistake of this index at these sizes in all files, and without.
+fn spoilt(model: &StructureModel, index: usize, values: &[f64]) -> [scene::Curves; 2] {
+    let data = few(model);
+    let all = mistakes::all(model, &data);
+    let made = Made {
+        mistake: all[index].as_ref(),
+        group: FrfGroup::ALL,
+        values,
+    };
+    [Some(made), None].map(|made| predict(model, &truth(model), &data, made).unwrap())
+}
+
+/// Filters at their corner, 19 Hz: of first order they turn by 45° and let 1/√2 through, Butterworth's second order turns by 90°.
+#[test]
+fn filters_do_to_a_file_what_their_corner_says() {
+    let model = model();
+    let line = 10;
+    let corner_rad = std::f64::consts::TAU * few(&model).blocks[0].frequency_hz[line];
+    let i = Complex64::i();
+    let cases = [
+        (12, corner_rad, i / (1.0 + i)),
+        (14, corner_rad, (i / (1.0 + i)).powi(2)),
+        (13, 1.0 / corner_rad, 1.0 / (1.0 + i)),
+        (15, 1.0 / corner_rad, 1.0 / (i * std::f64::consts::SQRT_2)),
+        (8, 0.3, Complex64::from(0.3f64.exp())),
+    ];
+    for (index, value, expected) in cases {
+        let [with, without] = spoilt(&model, index, &[value]);
+        for (with, without) in with.iter().zip(&without) {
+            assert!((with[line] / without[line] - expected).norm() < 1e-9, "{index}");
+        }
+    }
+}
+
+/// A quarter turn about z: who hits along x hits along y, and who measures x measures y.
+#[test]
+fn a_quarter_turn_takes_one_axis_for_another() {
+    let model = model();
+    let at = |response: usize, reference: usize| 3 * response + reference;
+    let [hit, plain] = spoilt(&model, 9, &[0.0, 0.0, 90.0]);
+    let [sensor, _] = spoilt(&model, 10, &[0.0, 0.0, 90.0]);
+    for line in 0..plain[0].len() {
+        for k in 0..3 {
+            assert!(
+                (hit[at(k, 0)][line] - plain[at(k, 1)][line]).norm() < 1e-9 * plain[at(k, 1)][line].norm()
+            );
+            assert!(
+                (sensor[at(0, k)][line] - plain[at(1, k)][line]).norm() < 1e-9 * plain[at(1, k)][line].norm()
+            );
+            assert!(
+                (hit[at(k, 2)][line] - plain[at(k, 2)][line]).norm() < 1e-9 * plain[at(k, 2)][line].norm()
+            );
+        }
+    }
+}
+
+/// A light sensor adds its inertia's force −m s² x to the hit (s = iω); one of a thousand tonnes stands still, and so does the point.
+#[test]
+fn a_sensors_mass_loads_the_point_that_it_sits_on() {
+    let model = model();
+    let mass = 1e-3;
+    let [light, plain] = spoilt(&model, 16, &[mass]);
+    let [heavy, _] = spoilt(&model, 16, &[1e6]);
+    let frequency_hz = &few(&model).blocks[0].frequency_hz;
+    for (line, hz) in frequency_hz.iter().enumerate() {
+        let inertia = mass * (std::f64::consts::TAU * hz).powi(2);
+        for response in 0..3 {
+            for reference in 0..3 {
+                let at = |a: usize, b: usize| plain[3 * a + b][line];
+                let through: Complex64 = (0..3).map(|a| at(response, a) * at(a, reference)).sum();
+                let change = light[3 * response + reference][line] - at(response, reference);
+                assert!((change - through * inertia).norm() < 0.01 * through.norm() * inertia);
+                assert!(
+                    heavy[3 * response + reference][line].norm() < 1e-2 * at(reference, reference).norm()
+                );
+            }
+        }
+    }
+}
+
+/// A window that decays by d moves every pole by d: H at s + d, which of a smooth function is H + d dH/ds.
+#[test]
+fn an_exponential_window_moves_the_poles() {
+    let model = model();
+    let decay = 1e-3;
+    let [with, without] = spoilt(&model, 11, &[decay]);
+    let mut data = few(&model);
+    let step_hz = 1e-3;
+    let mut beside = |sign: f64| {
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            block.frequency_hz.iter_mut().for_each(|f| *f += sign * step_hz);
+        }
+        predict(&model, &truth(&model), &data, None).unwrap()
+    };
+    let (above, below) = (beside(1.0), beside(-2.0));
+    for (k, curve) in with.iter().enumerate() {
+        for line in 0..curve.len() {
+            let ds = Complex64::i() * (2.0 * step_hz * std::f64::consts::TAU);
+            let slope = (above[k][line] - below[k][line]) / ds;
+            let change = curve[line] - without[k][line];
+            assert!(
+                (change - slope * decay).norm() < 0.01 * slope.norm() * decay,
+                "{k} {line}"
+            );
+        }
+    }
+}
+
+/// A gain of one posture that is 1 % too large: to first order it is found with its size, and takes away the χ² that it made but
+/// for what stiffnesses and damping can do.
+#[test]
+fn the_score_of_a_gain_is_its_size_and_what_it_cost() {
+    let model = model();
+    let mut data = few(&model);
+    let theta = truth(&model);
+    let all = mistakes::all(&model, &data);
+    let group = FrfGroup {
+        posture: Some(1),
+        ..FrfGroup::ALL
+    };
+    let made = Made {
+        mistake: all[8].as_ref(),
+        group,
+        values: &[0.01],
+    };
+    let mut curves = predict(&model, &theta, &data, Some(made)).unwrap().into_iter();
+    for block in &mut data.blocks {
+        for frf in &mut Arc::make_mut(block).frfs {
+            frf.receptance = curves.next().unwrap();
+            frf.noise_std = frf.receptance.iter().map(|h| 0.02 * h.norm()).collect();
+        }
+    }
+    let plain = predict(&model, &theta, &data, None).unwrap();
+    let chi2: f64 = scene::weighted(&plain, &data).iter().map(|r| r * r).sum();
+    // Of each line of eighteen FRFs, 2 · (0.01 / 0.02)².
+    assert!((chi2 / (18.0 * 40.0 * 0.5) - 1.0).abs() < 0.05, "{chi2}");
+    let linearised = score::Linearised::new(&model, &data, &theta).unwrap();
+    let scores = linearised.scores(all[8].as_ref()).unwrap();
+    let own = scores.iter().find(|s| s.group == group).unwrap();
+    // Between its usual size and nothing the prior leaves it; the parameters cannot stand in for a gain.
+    assert!((own.values[0] / 0.01 - 1.0).abs() < 0.1, "{own:?}");
+    assert!(
+        own.gain > 0.7 * chi2 && own.gain < 1.05 * chi2,
+        "{own:?} of {chi2}"
+    );
+    let best = scores.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap();
+    assert_eq!(best.group, group);
+}

@@ -113,3 +113,41 @@ impl Effect<Structure> for JointDamping {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::structural::DataSummary;
+    use crate::robot::fixture::irb6640;
+
+    /// Spring and damper of every joint have one time constant, and a fit may go a thousand times to either side.
+    #[test]
+    fn dampers_start_at_one_time_constant_of_their_springs() {
+        let robot = irb6640();
+        let at = At {
+            site: Site::Everywhere,
+            variant: 0,
+        };
+        let known = Known {
+            object: &robot,
+            data: DataSummary {
+                force_levels: 1,
+                postures: 1,
+                lowest_hz: 5.0,
+                highest_hz: 50.0,
+            },
+        };
+        let parameters = JointDamping.parameters(at, &known);
+        assert_eq!(parameters.len(), robot.joints.len() + 1);
+        for (parameter, joint) in parameters.iter().zip(&robot.joints) {
+            let stiffness = 1.0 / joint.compliance_rad_per_nm;
+            approx::assert_relative_eq!(
+                parameter.nominal / stiffness,
+                DAMPING_TIME_S,
+                max_relative = 1e-12
+            );
+            approx::assert_relative_eq!(parameter.bounds[0] * 1e3, parameter.nominal, max_relative = 1e-12);
+            approx::assert_relative_eq!(parameter.bounds[1], parameter.nominal * 1e3, max_relative = 1e-12);
+        }
+    }
+}

@@ -159,4 +159,21 @@ mod tests {
             }
         }
     }
+
+    /// By s = φ²: d(sin φ / φ)/ds = (φ cos φ − sin φ) / 2φ³, and d((1 − cos φ) / φ²)/ds = (φ sin φ − 2 (1 − cos φ)) / 2φ⁴.
+    #[test]
+    fn the_series_have_the_slopes_of_their_functions() {
+        for phi in [0.2f64, 1.0, 2.0] {
+            let s = Dual::variable(phi * phi, 0, 1);
+            let (sin, cos) = phi.sin_cos();
+            let first = sine_over_angle(&s);
+            approx::assert_relative_eq!(first.value, sin / phi, max_relative = 1e-12);
+            let slope = (phi * cos - sin) / (2.0 * phi.powi(3));
+            approx::assert_relative_eq!(first.derivative(0), slope, max_relative = 1e-9);
+            let second = one_minus_cosine_over_square(&s);
+            approx::assert_relative_eq!(second.value, (1.0 - cos) / (phi * phi), max_relative = 1e-12);
+            let slope = (phi * sin - 2.0 * (1.0 - cos)) / (2.0 * phi.powi(4));
+            approx::assert_relative_eq!(second.derivative(0), slope, max_relative = 1e-9);
+        }
+    }
 }

@@ -240,4 +240,127 @@ mod tests {
         approx::assert_relative_eq!(beside(48.0, 25.0), 2.0, max_relative = 1e-12);
         approx::assert_relative_eq!(beside(62.5, 25.0), 12.5, max_relative = 1e-12);
     }
+
+    use crate::signal::order_spectrum;
+    use rand::SeedableRng;
+    use std::f64::consts::TAU;
+
+    const RATE_HZ: f64 = 5000.0;
+
+    /// 1.2 s of a channel at 50 Hz with noise of 1 N, tooth passing of 60 N at 100 Hz and lines (Hz, N); as many of noise and `air`.
+    fn seen(seed: u64, lines: &[(f64, f64)], air: &[(f64, f64)]) -> (usize, OrderSpectrum, Vec<f64>) {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let mut made = |lines: &[(f64, f64)]| -> Vec<f64> {
+            (0..6000)
+                .map(|i| {
+                    let t = i as f64 / RATE_HZ;
+                    let sum: f64 = lines.iter().map(|(hz, a)| a * (TAU * hz * t + 0.3).sin()).sum();
+                    sum + crate::statistics::nearly_normal(&mut random)
+                })
+                .collect()
+        };
+        let cut: Vec<(f64, f64)> = lines
+            .iter()
+            .copied()
+            .chain([(100.0, 60.0), (200.0, 20.0)])
+            .collect();
+        let spectrum = order_spectrum(&made(&cut), RATE_HZ, 100.0, 40).unwrap();
+        (0, spectrum, made(air))
+    }
+
+    /// Chatter at 430 Hz with lines a tooth passing to either side, as a limit cycle has them (Insperger et al. 2003).
+    #[test]
+    fn chatter_is_found_with_its_side_lines_and_their_sizes() {
+        let chatter = [(430.0, 20.0), (330.0, 8.0), (530.0, 5.0)];
+        let mut other = seen(2, &chatter, &[]);
+        other.0 = 1;
+        let found = find_vibration(&[seen(1, &chatter, &[]), other], RATE_HZ, 50.0, 2).unwrap();
+        assert!((found.frequency_hz - 430.0).abs() < 0.3, "{}", found.frequency_hz);
+        assert_eq!(
+            found.lines.iter().map(|l| l.shift).collect::<Vec<_>>(),
+            [-2, -1, 0, 1, 2]
+        );
+        for (line, size) in found.lines.iter().zip([0.0, 8.0, 20.0, 5.0, 0.0]) {
+            assert_eq!(line.channels.iter().map(|c| c.0).collect::<Vec<_>>(), [0, 1]);
+            for (_, amplitude, noise) in &line.channels {
+                // Nine lines of noise of 1 N over 6000 samples: 2 · √(9 / 6000) N.
+                assert!(
+                    (noise / (2.0 * (9.0 / 6000f64).sqrt()) - 1.0).abs() < 0.1,
+                    "{noise}"
+                );
+                let above = (amplitude * amplitude - noise * noise).max(0.0).sqrt();
+                assert!(
+                    (above - size).abs() < 0.03 * size + 0.15,
+                    "{amplitude} for {size}"
+                );
+            }
+        }
+        assert_eq!(found.value_count(), 11);
+    }
+
+    /// No chatter: nothing there, a hum that the air shows as well, modulation next to the tooth passing, an order of the turn, what
+    /// lies so high that the sampling cannot hold it, and orders beyond half the sampling rate that fold back.
+    #[test]
+    fn what_is_no_vibration_of_the_cut_is_left() {
+        let found = |lines: &[(f64, f64)], air: &[(f64, f64)]| {
+            find_vibration(&[seen(3, lines, air)], RATE_HZ, 50.0, 2).map(|v| v.frequency_hz)
+        };
+        assert_eq!(found(&[], &[]), None);
+        assert!(found(&[(431.0, 6.0)], &[]).is_some());
+        assert_eq!(found(&[(430.0, 6.0)], &[(430.0, 6.0)]), None);
+        // A quarter of it is in the air: the cut makes the rest.
+        assert!(found(&[(431.0, 6.0)], &[(431.0, 1.5)]).is_some());
+        assert_eq!(found(&[(409.0, 6.0)], &[]), None);
+        assert!(found(&[(417.0, 6.0)], &[]).is_some());
+        assert_eq!(found(&[(450.0, 6.0)], &[]), None);
+        assert_eq!(found(&[(2363.0, 6.0)], &[]), None);
+        assert!(found(&[(2163.0, 6.0)], &[]).is_some());
+        // Noise of 1 N over 6000 samples has 0.013 N on a line: thirty times its power are 0.14 N of amplitude.
+        assert_eq!(found(&[(430.0, 0.11)], &[]), None);
+        assert!(found(&[(430.0, 0.19)], &[]).is_some());
+    }
+
+    /// At 51 Hz and 5000 Hz of sampling, order 91 (4641 Hz) stands at 359 Hz: a fold, no vibration.
+    #[test]
+    fn an_order_that_folds_back_is_no_vibration() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let samples: Vec<f64> = (0..6000)
+            .map(|i| {
+                let t = i as f64 / RATE_HZ;
+                20.0 * (TAU * 91.0 * 51.0 * t).sin() + crate::statistics::nearly_normal(&mut random)
+            })
+            .collect();
+        let spectrum = order_spectrum(&samples, RATE_HZ, RATE_HZ / 51.0, 40).unwrap();
+        let own = [(0, spectrum, Vec::new())];
+        assert_eq!(find_vibration(&own, RATE_HZ, 51.0, 2), None);
+        // At a speed that has no order there it is one.
+        assert!(find_vibration(&own, RATE_HZ, 47.3, 2).is_some());
+    }
+
+    #[test]
+    fn standing_lines_have_their_size_and_what_the_air_has_of_it() {
+        let own = seen(5, &[(431.0, 20.0), (837.0, 5.0), (2363.0, 9.0)], &[(837.0, 5.0)]);
+        let lines = standing_lines(std::slice::from_ref(&own), RATE_HZ, 50.0, true);
+        let found: Vec<f64> = lines.iter().map(|l| l.frequency_hz).collect();
+        assert_eq!(found.len(), 2, "{found:?}");
+        for (line, (hz, size, air)) in lines.iter().zip([(431.0, 20.0, 0.0), (837.0, 5.0, 5.0)]) {
+            assert!((line.frequency_hz - hz).abs() < 0.3);
+            assert!((line.resolution_hz - RATE_HZ / 6000.0).abs() < 1e-9);
+            let (channel, amplitude, in_air) = line.channels[0];
+            assert_eq!(channel, 0);
+            // A line between two of the spectrum leaves some of its power beyond its neighbours.
+            assert!((amplitude / size - 1.0).abs() < 0.06, "{amplitude} for {size}");
+            assert!((in_air.unwrap() - air).abs() < 0.3, "{in_air:?}");
+        }
+        // The orders left in, tooth passing stands first; without air nothing is said of it.
+        let (_, spectrum, _) = seen(5, &[(431.0, 20.0)], &[]);
+        let mut with_orders = spectrum;
+        with_orders.rest[120] = 30.0;
+        let lines = standing_lines(&[(0, with_orders.clone(), vec![0.0; 60])], RATE_HZ, 50.0, false);
+        assert!((lines[0].frequency_hz - 100.0).abs() < 0.1);
+        assert!((lines[0].channels[0].1 - 60.0).abs() < 0.1);
+        assert_eq!(lines[0].channels[0].2, None);
+        let lines = standing_lines(&[(0, with_orders, Vec::new())], RATE_HZ, 50.0, true);
+        assert_eq!(lines.len(), 1);
+    }
 }

@@ -536,4 +536,182 @@ mod tests {
         assert_eq!([3, 5, 9].map(|own| progress(own, [3, 9])), [0.0, 1.0 / 3.0, 1.0]);
         assert_eq!(progress(4, [4, 4]), 0.0);
     }
+
+    use crate::identify::forces::made_cuts::{
+        AS_IT_IS, CONTACT_S, METAL, MILLED, changed, drilled, milled, turned,
+    };
+    use approx::assert_relative_eq;
+
+    const HOLES: [f64; 4] = [900.0, 30.0, 700.0, 45.0];
+
+    fn own(data: &CuttingData) -> Vec<CutData> {
+        data.cuts.iter().map(|c| (**c).clone()).collect()
+    }
+
+    /// An amplifier that counts torque the other way round: all torques come out negative, and are turned. One that is positive, and
+    /// they are what they are.
+    #[test]
+    fn a_torque_that_is_negative_throughout_is_turned() {
+        let right = drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0]]);
+        let torque = |data: &CuttingData, i: usize| {
+            let channel = data.cuts[i].channels[3].as_ref().unwrap();
+            (channel.level[8], channel.integral[8])
+        };
+        let negative = |cuts: &[usize]| {
+            let mut all = own(&right);
+            for i in cuts {
+                let channel = all[*i].channels[3].as_mut().unwrap();
+                channel.level.iter_mut().for_each(|v| *v = -*v);
+                channel.integral = vec![-0.25; 14];
+            }
+            CuttingData::new(Process::Drilling, 2, AS_IT_IS, all).unwrap()
+        };
+        let turned = negative(&[0, 1]);
+        assert_eq!(torque(&turned, 0), (torque(&right, 0).0, 0.25));
+        assert_eq!(torque(&turned, 1), (torque(&right, 1).0, 0.25));
+        let one = negative(&[1]);
+        assert_eq!(torque(&one, 1), (-torque(&right, 1).0, -0.25));
+    }
+
+    /// Thrusts of 3 N and 4 N above the air against torques of 0.3 N·m and 0.4 N·m: a torque counts ten times.
+    #[test]
+    fn torques_and_thrusts_are_made_equally_large() {
+        let mut cuts = own(&drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0]]));
+        for (cut, force) in cuts.iter_mut().zip([3.0, 4.0]) {
+            for (channel, part) in [(2, 1.0), (3, 0.1)] {
+                let channel = cut.channels[channel].as_mut().unwrap();
+                for (b, level) in channel.level.iter_mut().enumerate() {
+                    *level = 7.0
+                        + if cut.steady.contains(&b) {
+                            part * force
+                        } else {
+                            0.0
+                        };
+                }
+            }
+        }
+        let data = CuttingData::new(Process::Drilling, 2, AS_IT_IS, cuts).unwrap();
+        assert_relative_eq!(data.force_per_torque, 10.0, max_relative = 1e-12);
+        // Where nothing says what a torque is worth it counts as it is.
+        assert_eq!(turned(METAL, &[0.1]).force_per_torque, 1.0);
+        let mut none = own(&data);
+        for channel in none.iter_mut().filter_map(|c| c.channels[2].as_mut()) {
+            channel.level = vec![7.0; 14];
+        }
+        assert_eq!(
+            CuttingData::new(Process::Drilling, 2, AS_IT_IS, none)
+                .unwrap()
+                .force_per_torque,
+            1.0
+        );
+    }
+
+    /// A dynamometer turned by 30° about z: the inverse turns back.
+    #[test]
+    fn recorded_forces_are_the_tools_turned_back() {
+        let (s, c) = (0.5, 0.75f64.sqrt());
+        let turned_by = [[c, -s, 0.0], [s, c, 0.0], AS_IT_IS[2]];
+        let data =
+            CuttingData::new(Process::Milling, 2, turned_by, own(&milled(METAL, &MILLED[..1]))).unwrap();
+        let back = [[c, s, 0.0], [-s, c, 0.0], AS_IT_IS[2]];
+        for (found, expected) in data.dyno_from_tool.iter().flatten().zip(back.iter().flatten()) {
+            assert_relative_eq!(*found, *expected, epsilon = 1e-12);
+        }
+        let lost = [[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], AS_IT_IS[2]];
+        assert!(CuttingData::new(Process::Milling, 2, lost, own(&data)).is_err());
+    }
+
+    /// Two real numbers an order and one a block, less the offset and slope of each zero line and the angle of the tool.
+    #[test]
+    fn values_are_counted_less_what_is_fitted_to_the_cut_alone() {
+        let data = milled(METAL, &MILLED[..2]);
+        assert_eq!(data.cuts[0].value_count(), 3 * (2 * 12 + 14 - 2) - 1);
+        assert_eq!(data.value_count(), 2 * data.cuts[0].value_count());
+        assert_eq!(data.channel_count(), 6);
+        assert_eq!(data.filtered(|i| i == 1).cuts[0].id, "cut-1");
+    }
+
+    /// What effects are told: a wear effect needs the order of the cuts, a speed effect their speeds, a size effect the feeds.
+    #[test]
+    fn the_summary_says_what_the_cuts_can_show() {
+        let made = milled(METAL, &MILLED);
+        let mut cuts = own(&made);
+        for (cut, (order, speed)) in cuts.iter_mut().zip([(7, 50.0), (3, 200.0), (5, 100.0)]) {
+            (cut.order, cut.cutting_speed_m_per_min) = (Some(order), speed);
+        }
+        let data = CuttingData::new(Process::Milling, 2, AS_IT_IS, cuts.clone()).unwrap();
+        // From the 3rd to the 7th; against √(50 · 200) m/min.
+        let settings: Vec<(f64, f64)> = data
+            .cuts
+            .iter()
+            .map(|c| (c.setting.progress, c.setting.speed_ratio))
+            .collect();
+        assert_eq!(settings, [(1.0, 0.5), (0.0, 2.0), (0.5, 1.0)]);
+        let s = &data.summary;
+        assert_eq!((s.sequence_length, s.feeds, s.engagements, s.cuts), (3, 3, 3, 3));
+        assert_eq!(s.speed_m_per_min, [50.0, 200.0]);
+        assert_eq!((s.smallest_feed_mm, s.largest_feed_mm), (0.05, 0.1));
+        assert_eq!(s.channels, [true, true, true, false]);
+        assert!(s.straight_edge && s.one_helix && s.even_pitch && s.air_on_both_sides);
+        // Order 12 of 50 Hz; fourteen blocks of a tenth of a second.
+        assert_relative_eq!(s.highest_hz, 600.0, max_relative = 1e-12);
+        assert_relative_eq!(s.longest_record_s, 1.4, max_relative = 1e-9);
+        assert_eq!(s.vibration_hz, None);
+        // One cut without its place, and there is no sequence; feeds a thousandth apart are one feed.
+        cuts[1].order = None;
+        cuts[1].feed_mm = 0.05 * 1.0005;
+        cuts[2].steady = 3..10;
+        let some = CuttingData::new(Process::Milling, 2, AS_IT_IS, cuts)
+            .unwrap()
+            .summary;
+        assert_eq!(
+            (some.sequence_length, some.feeds, some.air_on_both_sides),
+            (0, 2, false)
+        );
+        let holes = drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0], [0.3, 0.0]]).summary;
+        assert_eq!(
+            (holes.full_holes, holes.pilot_holes, holes.engagements),
+            (2, 1, 0)
+        );
+        let uneven = changed(&made, |cut| {
+            if let CutKind::Milling { cut, .. } = &mut cut.kind {
+                cut.places = cut.places_or_even();
+                cut.places[1].ahead_rad += 0.1;
+                cut.places[1].lag_rad *= 1.1;
+            }
+        });
+        let uneven = CuttingData::new(Process::Milling, 2, AS_IT_IS, own(&uneven))
+            .unwrap()
+            .summary;
+        assert!(!uneven.even_pitch && !uneven.one_helix && uneven.straight_edge);
+    }
+
+    /// Where the contact may be is narrowed to the moment that zero line and shape of the entry fit best, and kept there.
+    #[test]
+    fn the_contact_of_a_drill_is_narrowed_to_where_its_entry_fits() {
+        let data = drilled(HOLES, &[[0.05, 3.0]]);
+        let mut cut = own(&data).remove(0);
+        let CutKind::Drilling { cut: hole, contact_s } = &mut cut.kind else {
+            unreachable!()
+        };
+        // 2.5 mm/s: it enters for half a second, from contact on.
+        let entry = hole.entry_s();
+        assert_relative_eq!(
+            entry,
+            3.25 / f64::to_radians(67.5).tan() / 2.5,
+            max_relative = 1e-9
+        );
+        *contact_s = [-3.0, -0.3];
+        for channel in cut.channels.iter_mut().flatten() {
+            channel.level_std = vec![0.1; 14];
+        }
+        cut.narrow_contact();
+        let CutKind::Drilling { contact_s, .. } = &cut.kind else {
+            unreachable!()
+        };
+        let made = CONTACT_S;
+        // A seventh of the entry and three blocks to either side, not beyond the beginning of the steady cut.
+        assert_relative_eq!(contact_s[0], made - 0.15 * entry - 0.3, epsilon = 0.06);
+        assert_eq!(contact_s[1], -0.3);
+    }
 }

@@ -556,4 +556,369 @@ mod tests {
         approx::assert_relative_eq!(forces.slope[1][0][3], slope.re, max_relative = 1e-12);
         approx::assert_relative_eq!(forces.slope[1][0][4], slope.im, max_relative = 1e-12);
     }
+
+    use crate::effects::cutting::{Runout, Vibration};
+    use crate::identify::forces::cutting_data::{CutKind, CuttingData};
+    use crate::identify::forces::made_cuts::{AS_IT_IS, METAL, MILLED, drilled, milled, turned};
+    use approx::assert_relative_eq;
+
+    fn constants(values: &[f64]) -> Vec<Dual> {
+        values.iter().map(|v| Dual::constant(*v)).collect()
+    }
+
+    fn mill(data: &CuttingData) -> (&CutData, &MillingCut, &UnitForces) {
+        let cut = &*data.cuts[0];
+        match &cut.kind {
+            CutKind::Milling { cut: milling, unit } => (cut, milling, unit),
+            _ => unreachable!("a milled cut"),
+        }
+    }
+
+    /// Turned by 90° about z and a hundredth of z let into x: forces are mixed as vectors, slopes by the rule of products.
+    #[test]
+    fn mixed_channels_are_sums_of_what_went_in() {
+        let mut forces = Forces::zero(1, 1);
+        forces.value = [vec![2.0], vec![3.0], vec![5.0], vec![7.0]];
+        forces.slope[0] = [vec![0.2], vec![0.3], vec![0.5], vec![0.7]];
+        let mut mixing = [(); 3].map(|()| [(); 3].map(|()| Dual::constant(0.0)));
+        mixing[0][1] = Dual::constant(-1.0);
+        mixing[0][2] = Dual::variable(0.01, 0, 1);
+        mixing[1][0] = Dual::constant(1.0);
+        mixing[2][2] = Dual::constant(1.0);
+        forces.mix(&mixing);
+        let values: Vec<f64> = forces.value.iter().map(|v| v[0]).collect();
+        assert_eq!(values, [-3.0 + 0.05, 2.0, 5.0, 7.0]);
+        let slopes: Vec<f64> = forces.slope[0].iter().map(|v| v[0]).collect();
+        // A further N of z in x for each unit of the crosstalk: 5 N.
+        assert_eq!(slopes, [-0.3 + 0.005 + 5.0, 0.2, 0.5, 0.7]);
+    }
+
+    /// A tool that 100 N push off by 1 µm/N: of 0.5 mm, s is cut with 0.5 (1 − s) = 0.001 · 100 s.
+    #[test]
+    fn what_is_pushed_off_is_not_cut() {
+        let mut forces = Forces::zero(1, 1);
+        forces.value[2] = vec![100.0];
+        let share = |compliance: f64, forces: &Forces| {
+            depth_share(forces, &Dual::variable(compliance, 0, 1), 0.5, &AS_IT_IS)
+        };
+        let s = share(1e-3, &forces);
+        assert_relative_eq!(
+            0.5 * (1.0 - s.value),
+            1e-3 * 100.0 * s.value,
+            max_relative = 1e-12
+        );
+        let h = 1e-9;
+        let difference = (share(1e-3 + h, &forces).value - share(1e-3 - h, &forces).value) / (2.0 * h);
+        assert_relative_eq!(s.derivative(0), difference, max_relative = 1e-6);
+        // The axial force of the tool, where the dynamometer's y shows it with the sign turned.
+        let turned = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]];
+        let mut recorded = Forces::zero(1, 1);
+        recorded.value[1] = vec![-100.0];
+        let same = depth_share(&recorded, &Dual::constant(1e-3), 0.5, &turned);
+        assert_relative_eq!(same.value, s.value, max_relative = 1e-12);
+        // Drawn in by as much as it cuts there is no end to it, and pushed out of the work it still rubs.
+        assert_eq!(share(-6e-3, &forces).value, DEPTH_SHARES[1]);
+        assert_eq!(share(-4.9e-3, &forces).value, DEPTH_SHARES[1]);
+        assert_eq!(share(1.0, &forces).value, DEPTH_SHARES[0]);
+        assert_eq!(share(0.0, &forces).value, 1.0);
+    }
+
+    /// Axial force of the whole cut, 1 − s of the depth given up, at the depth that is left.
+    #[test]
+    fn a_pushed_off_mill_cuts_the_force_of_the_depth_that_is_left() {
+        let data = milled(METAL, &MILLED[..1]);
+        let (cut, milling, unit) = mill(&data);
+        let of = |compliance: Option<f64>| {
+            let mut physics = CutPhysics::of(constants(&METAL));
+            physics.axial_compliance_mm_per_n = compliance.map(Dual::constant);
+            milling_forces(&physics, cut, milling, unit, &AS_IT_IS, 0).0.value
+        };
+        let (full, pushed) = (of(None), of(Some(2e-3)));
+        // The mean force goes with the depth.
+        let s = pushed[2][0] / full[2][0];
+        assert_relative_eq!(1.0 - s, 2e-3 * pushed[2][0], max_relative = 1e-9);
+        for axis in 0..3 {
+            assert_relative_eq!(pushed[axis][0], s * full[axis][0], max_relative = 1e-9);
+        }
+    }
+
+    /// Everything that an effect can do to a milled cut, alone and together, by its parameters: against differences.
+    #[test]
+    fn slopes_of_milling_forces_are_their_differences() {
+        type Change = fn(&mut CutPhysics, &[Dual]);
+        let changes: [(&str, Change); 7] = [
+            ("size", |p, d| p.size_exponent = Some(d[6].clone())),
+            ("runout", |p, d| {
+                let (offset_mm, angle_rad) = (d[7].clone(), d[8].clone());
+                p.runout = Some(Runout { offset_mm, angle_rad });
+            }),
+            ("radius", |p, d| {
+                let mut own = p.own_teeth.take().unwrap_or_default();
+                own.add_radius(1, 2, d[9].clone());
+                p.own_teeth = Some(own);
+            }),
+            ("angle", |p, d| {
+                let mut own = p.own_teeth.take().unwrap_or_default();
+                own.add_delay(1, 2, &d[10]);
+                p.own_teeth = Some(own);
+            }),
+            ("push-off", |p, d| {
+                p.axial_compliance_mm_per_n = Some(d[11].clone())
+            }),
+            ("resonance", |p, d| {
+                let own = || [d[12].clone(), d[13].clone()];
+                p.dynamics = Some([own(), own(), own()]);
+            }),
+            ("crosstalk", |p, d| {
+                let mut mixing = Dual::unit_matrix();
+                mixing[0][2] = d[14].clone();
+                p.crosstalk = Some(mixing.clone());
+                mixing[1][0] = d[14].clone();
+                p.tilt = Some(mixing);
+            }),
+        ];
+        let mut theta = METAL.to_vec();
+        theta.extend([0.25, 0.006, 0.5, 0.004, 0.05, 1e-4, 900.0, 0.05, 0.03]);
+        let data = milled(METAL, &MILLED[1..2]);
+        let (cut, milling, unit) = mill(&data);
+        let together = [vec![0, 2], vec![1, 3], vec![4, 5, 6], vec![0, 1, 2, 3, 4, 5, 6]];
+        let alone = (0..changes.len()).map(|i| vec![i]);
+        for which in alone.chain(together) {
+            let forces = |theta: &[f64], count: usize| {
+                let duals: Vec<Dual> = theta
+                    .iter()
+                    .enumerate()
+                    .map(|(i, v)| {
+                        if count > 0 {
+                            Dual::variable(*v, i, count)
+                        } else {
+                            Dual::constant(*v)
+                        }
+                    })
+                    .collect();
+                let mut physics = CutPhysics::of(duals[..6].to_vec());
+                which.iter().for_each(|i| changes[*i].1(&mut physics, &duals));
+                milling_forces(&physics, cut, milling, unit, &AS_IT_IS, count).0
+            };
+            let here = forces(&theta, theta.len());
+            let names: Vec<&str> = which.iter().map(|i| changes[*i].0).collect();
+            for p in 0..theta.len() {
+                let h = 1e-4 * theta[p];
+                let at = |sign: f64| {
+                    let mut moved = theta.clone();
+                    moved[p] += sign * h;
+                    forces(&moved, 0).value
+                };
+                let (high, low) = (at(1.0), at(-1.0));
+                for axis in 0..3 {
+                    let largest = here.slope[p][axis].iter().fold(1e-3f64, |m, v| m.max(v.abs()));
+                    for (n, slope) in here.slope[p][axis].iter().enumerate() {
+                        let difference = (high[axis][n] - low[axis][n]) / (2.0 * h);
+                        assert!(
+                            (slope - difference).abs() < 0.01 * largest,
+                            "{names:?} {p} axis {axis} at {n}: {slope} {difference}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// What the surface of the tooth before puts on the chip: nothing where it left in step, twice the amplitude where it left in
+    /// counter-phase (Altintas 2012, §3.3), along the direction of the vibration.
+    #[test]
+    fn a_tooth_in_step_with_the_one_before_sees_an_even_chip() {
+        let data = milled(METAL, &MILLED[..1]);
+        let (cut, milling, _) = mill(&data);
+        let mut physics = CutPhysics::of(constants(&METAL));
+        let change = |physics: &CutPhysics| chip_change(physics, cut, milling).map(|c| c.map(|d| d.value));
+        assert_eq!(change(&physics), None);
+        // Two teeth at 50 Hz pass at 100 Hz.
+        for (hz, factor) in [
+            (400.0, 0.0),
+            (450.0, 2.0),
+            (425.0, 2f64.sqrt()),
+            (25.0, 2f64.sqrt()),
+        ] {
+            physics.vibration = Some(Vibration {
+                frequency_hz: Dual::constant(hz),
+                amplitude_mm: Dual::constant(0.01),
+                direction_rad: Dual::constant(std::f64::consts::FRAC_PI_6),
+            });
+            let [x, y] = change(&physics).unwrap();
+            assert_relative_eq!(x, 0.01 * factor * 0.75f64.sqrt(), epsilon = 1e-12);
+            assert_relative_eq!(y, 0.01 * factor * 0.5, epsilon = 1e-12);
+        }
+    }
+
+    /// A little vibration puts on its own line, for each mm of change of the chip, what the directional factors of a slot say.
+    #[test]
+    fn lines_of_a_vibration_have_slopes_by_its_size_and_direction() {
+        let data = milled(METAL, &MILLED[..1]);
+        let (cut, milling, unit) = mill(&data);
+        let lines = |theta: &[f64; 3], count: usize| {
+            let dual = |i: usize| {
+                if count > 0 {
+                    Dual::variable(theta[i], i, count)
+                } else {
+                    Dual::constant(theta[i])
+                }
+            };
+            let mut coefficients = constants(&METAL);
+            coefficients[0] = dual(2);
+            let mut physics = CutPhysics::of(coefficients);
+            physics.vibration = Some(Vibration {
+                frequency_hz: Dual::constant(430.0),
+                amplitude_mm: dual(0),
+                direction_rad: dual(1),
+            });
+            let (forces, lines) = milling_forces(&physics, cut, milling, unit, &AS_IT_IS, count);
+            (forces, lines.unwrap())
+        };
+        let theta = [0.004, 0.7, METAL[0]];
+        let (forces, here) = lines(&theta, 3);
+        assert_eq!(here.len(), 5);
+        for p in 0..3 {
+            let h = 1e-5 * theta[p];
+            let at = |sign: f64| {
+                let mut moved = theta;
+                moved[p] += sign * h;
+                lines(&moved, 0)
+            };
+            let (high, low) = (at(1.0), at(-1.0));
+            for (line, (high, low)) in here.iter().zip(high.1.iter().zip(&low.1)) {
+                for axis in 0..3 {
+                    let difference = (high[axis].value - low[axis].value) / (2.0 * h);
+                    let scale = line[axis].value / theta[p];
+                    assert!(
+                        (line[axis].derivative(p) - difference).abs() < 0.03 * scale,
+                        "{p} {axis}"
+                    );
+                }
+            }
+            let difference = (high.0.value[1][0] - low.0.value[1][0]) / (2.0 * h);
+            let scale = forces.value[1][0].abs() / theta[p];
+            assert!(
+                (forces.slope[p][1][0] - difference).abs() < 0.01 * scale,
+                "mean {p}"
+            );
+        }
+    }
+
+    /// K ∝ (h / 0.1 mm)^−p: of 0.2 mm, a chip counts as 0.2 · 2^−p. At 0.1 mm nothing changes.
+    #[test]
+    fn thin_chips_are_harder_in_turning_and_drilling() {
+        let exponent = Dual::variable(0.3, 0, 1);
+        for (feed, factor) in [(0.1, 1.0), (0.2, 2f64.powf(-0.3))] {
+            let data = turned(METAL, &[feed]);
+            let CutKind::Turning { edge } = &data.cuts[0].kind else {
+                unreachable!()
+            };
+            let mut physics = CutPhysics::of(constants(&METAL));
+            physics.size_exponent = Some(exponent.clone());
+            let forces = turning_forces(&physics, edge, &AS_IT_IS, 1);
+            // Against the feed the radial, out of the work the axial, along the speed the tangential force; 1.5 mm deep.
+            for (axis, k) in [(0, 1), (1, 2), (2, 0)] {
+                let chip = feed * factor;
+                assert_relative_eq!(
+                    forces.value[axis][0],
+                    1.5 * (METAL[k] * chip + METAL[k + 3]),
+                    max_relative = 1e-12
+                );
+                assert_relative_eq!(
+                    forces.slope[0][axis][0],
+                    -1.5 * METAL[k] * chip * (feed / 0.1f64).ln(),
+                    epsilon = 1e-9
+                );
+            }
+        }
+        let data = drilled([900.0, 30.0, 700.0, 45.0], &[[0.2, 3.0]]);
+        let (cut, CutKind::Drilling { cut: hole, .. }) = (&*data.cuts[0], &data.cuts[0].kind) else {
+            unreachable!()
+        };
+        let mut physics = CutPhysics::of(constants(&[900.0, 30.0, 700.0, 45.0]));
+        physics.size_exponent = Some(exponent);
+        let chip = 0.1 * f64::to_radians(67.5).sin();
+        let counts_as = chip * (chip / 0.1f64).powf(-0.3);
+        let forces = drilling_forces(&physics, cut, hole, -10.0, 1);
+        // At full diameter: two lips from 1.5 mm to 4.75 mm.
+        let thrust = 2.0 * (4.75 - 1.5) * (700.0 * counts_as + 45.0);
+        assert_relative_eq!(forces.value[2][5], thrust, max_relative = 1e-9);
+        let lever = (4.75f64.powi(2) - 1.5f64.powi(2)) / f64::to_radians(67.5).sin() / 1000.0;
+        assert_relative_eq!(
+            forces.value[3][5],
+            lever * (900.0 * counts_as + 30.0),
+            max_relative = 1e-9
+        );
+        // Beyond the hole there is air.
+        assert_eq!(forces.value[2][12], 0.0);
+        let slope = 2.0 * (4.75 - 1.5) * 700.0 * counts_as * -(chip / 0.1f64).ln();
+        assert_relative_eq!(forces.slope[0][2][5], slope, max_relative = 1e-9);
+    }
+
+    /// The chisel pushes in a hole drilled into the full alone; the margins rub on the wall that has been bored.
+    #[test]
+    fn chisel_and_margins_act_where_they_touch() {
+        let mut physics = CutPhysics::of(constants(&[0.0; 4]));
+        physics.chisel_thrust_n = Some(Dual::constant(80.0));
+        physics.margin_n_per_mm = Some(Dual::constant(2.0));
+        for (pilot, thrust) in [(0.0, 80.0), (3.0, 0.0)] {
+            let data = drilled([900.0, 30.0, 700.0, 45.0], &[[0.2, pilot]]);
+            let (cut, CutKind::Drilling { cut: hole, .. }) = (&*data.cuts[0], &data.cuts[0].kind) else {
+                unreachable!()
+            };
+            let forces = drilling_forces(&physics, cut, hole, -1.0, 0);
+            assert_relative_eq!(forces.value[2][5], thrust, epsilon = 1e-12);
+            // 10 mm/s: one second before the middle of the record, and block 5 lies from −0.2 s to −0.1 s.
+            let inner = if pilot > 0.0 {
+                1.5
+            } else {
+                0.5 * 1.425 / f64::to_radians(125.0).sin()
+            };
+            let bored = 10.0 * 0.85 - (4.75 - inner) / f64::to_radians(67.5).tan();
+            assert_relative_eq!(
+                forces.value[3][5],
+                2.0 * bored * 4.75 / 1000.0,
+                max_relative = 1e-9
+            );
+        }
+    }
+
+    /// Radius and angle of a tooth are told by the closed form where the chip is linear, and by quadrature where the helix differs.
+    #[test]
+    fn teeth_of_two_helix_angles_have_slopes_too() {
+        let data = milled(METAL, &MILLED[1..2]);
+        let (cut, plain, _) = mill(&data);
+        let mut milling = plain.clone();
+        milling.places = plain.places_or_even();
+        milling.places[1].lag_rad *= 1.2;
+        let unit = milling.linear(cut.orders);
+        let forces = |radius: f64, count: usize| {
+            let mut physics = CutPhysics::of(constants(&METAL));
+            let mut own = OwnTeeth::default();
+            own.add_radius(
+                1,
+                2,
+                if count > 0 {
+                    Dual::variable(radius, 0, 1)
+                } else {
+                    Dual::constant(radius)
+                },
+            );
+            physics.own_teeth = Some(own);
+            milling_forces(&physics, cut, &milling, &unit, &AS_IT_IS, count).0
+        };
+        let here = forces(0.004, 1);
+        let (high, low) = (forces(0.0041, 0), forces(0.0039, 0));
+        for axis in 0..3 {
+            let largest = here.slope[0][axis].iter().fold(0.0f64, |m, v| m.max(v.abs()));
+            for n in 0..here.slope[0][axis].len() {
+                let difference = (high.value[axis][n] - low.value[axis][n]) / 2e-4;
+                assert!(
+                    (here.slope[0][axis][n] - difference).abs() < 0.02 * largest,
+                    "{axis} {n}"
+                );
+            }
+        }
+    }
 }

@@ -248,3 +248,120 @@ fn steady_means(cut: &CutData) -> [Option<f64>; 4] {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::forces::made_cuts::{
+        AS_IT_IS, METAL, MILLED, changed, drilled, in_the_cut, milled, turned,
+    };
+    use approx::assert_relative_eq;
+
+    fn nominal(data: &CuttingData, has_edge: bool) -> Vec<f64> {
+        let model = CuttingModel::new(data, has_edge).unwrap();
+        model.parameters.iter().map(|p| p.nominal).collect()
+    }
+
+    fn are(found: &[f64], truth: &[f64], tolerance: f64) {
+        assert_eq!(found.len(), truth.len());
+        for (found, truth) in found.iter().zip(truth) {
+            assert_relative_eq!(*found, *truth, max_relative = tolerance);
+        }
+    }
+
+    /// Two feeds tell cutting from edge force: the level above a zero that drifts is b (K h + K_e) in each process, and for a slot
+    /// and its quarters what the forces of the single teeth add up to.
+    #[test]
+    fn mean_forces_give_back_the_coefficients_that_made_them() {
+        are(&nominal(&turned(METAL, &[0.1, 0.2, 0.3]), true), &METAL, 2e-3);
+        are(&nominal(&milled(METAL, &MILLED), true), &METAL, 1e-2);
+        let holes = [900.0, 30.0, 700.0, 45.0];
+        let data = drilled(holes, &[[0.2, 0.0], [0.35, 3.0], [0.5, 3.0]]);
+        are(&nominal(&data, true), &holes, 2e-3);
+    }
+
+    /// One feed does not tell them apart: the edge counts as 0.02 mm of chip then, and the force is all explained.
+    #[test]
+    fn one_feed_leaves_the_usual_share_to_the_edge() {
+        let found = nominal(&turned(METAL, &[0.1]), true);
+        for k in 0..3 {
+            let force = 0.1 * METAL[k] + METAL[k + 3];
+            assert_relative_eq!(found[k], force / (0.1 + 0.02), max_relative = 1e-4);
+            assert_relative_eq!(found[k + 3], 0.02 * found[k], max_relative = 1e-4);
+        }
+        // Half of the feed, in mm, goes to the chip of each of the two lips.
+        let found = nominal(&drilled([900.0, 30.0, 700.0, 45.0], &[[0.2, 3.0]]), true);
+        let chip = 0.1 * f64::to_radians(67.5).sin();
+        for (k, force) in [(0, 900.0 * chip + 30.0), (2, 700.0 * chip + 45.0)] {
+            assert_relative_eq!(found[k], force / (chip + 0.02), max_relative = 1e-4);
+            assert_relative_eq!(found[k + 1], 0.02 * found[k], max_relative = 1e-4);
+        }
+    }
+
+    #[test]
+    fn without_edge_coefficients_the_chip_takes_it_all() {
+        let found = nominal(&turned(METAL, &[0.1]), false);
+        let all: Vec<f64> = (0..3).map(|k| METAL[k] + METAL[k + 3] / 0.1).collect();
+        are(&found, &all, 1e-6);
+    }
+
+    /// A dynamometer clamped on turned by 90°: its x shows the tool's y, its y the tool's −x. The coefficients are the tool's.
+    #[test]
+    fn a_turned_dynamometer_changes_no_coefficient() {
+        let plain = turned(METAL, &[0.1, 0.2, 0.3]);
+        let cuts = changed(&plain, |cut| {
+            let [x, y, z, _] = &cut.channels;
+            let (mut minus_x, y, z) = (x.clone().unwrap(), y.clone(), z.clone());
+            minus_x.level.iter_mut().for_each(|v| *v = -*v);
+            cut.channels = [y, Some(minus_x), z, None];
+        });
+        let cuts = cuts.cuts.iter().map(|c| (**c).clone()).collect();
+        let tool_from_dyno = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], AS_IT_IS[2]];
+        let data = CuttingData::new(Process::Turning, 1, tool_from_dyno, cuts).unwrap();
+        are(&nominal(&data, true), &METAL, 2e-3);
+    }
+
+    /// Without air the blocks are taken as they are: a zero of 3 N counts as force.
+    #[test]
+    fn the_zero_is_taken_from_the_air_where_there_is_some() {
+        let with_air = turned(METAL, &[0.1]);
+        let force = 1.5 * (0.1 * METAL[0] + METAL[3]);
+        assert_relative_eq!(
+            steady_means(&with_air.cuts[0])[2].unwrap(),
+            force,
+            max_relative = 1e-12
+        );
+        let without = changed(&with_air, |cut| {
+            let all = 0..cut.block_s.len();
+            cut.block_s = all
+                .clone()
+                .filter(|b| in_the_cut(*b))
+                .map(|b| cut.block_s[b])
+                .collect();
+            for channel in cut.channels.iter_mut().flatten() {
+                channel.level = all
+                    .clone()
+                    .filter(|b| in_the_cut(*b))
+                    .map(|b| channel.level[b])
+                    .collect();
+            }
+            cut.steady = 0..cut.block_s.len();
+        });
+        let [.., z, torque] = steady_means(&without.cuts[0]);
+        // The steady blocks lie about the middle of the record, where the zero is 3 N.
+        assert_relative_eq!(z.unwrap(), force + 3.0, max_relative = 1e-12);
+        assert_eq!(torque, None);
+    }
+
+    /// The force of a drill that enters is no zero: a hole whose entry takes 0.2 s leaves the air before it alone.
+    #[test]
+    fn blocks_of_an_entering_drill_are_no_air() {
+        let holes = [900.0, 30.0, 700.0, 45.0];
+        let data = drilled(holes, &[[0.2, 3.0]]);
+        let cut = &data.cuts[0];
+        let chip = 0.1 * f64::to_radians(67.5).sin();
+        // Two lips from the pilot's radius of 1.5 mm to 4.75 mm.
+        let thrust = 2.0 * (4.75 - 1.5) * (700.0 * chip + 45.0);
+        assert_relative_eq!(steady_means(cut)[2].unwrap(), thrust, max_relative = 1e-9);
+    }
+}

@@ -440,3 +440,218 @@ fn best_contact(lines: &[Option<BaselineDrift>; 4], range: [f64; 2], forces: imp
     }
     x
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::Registry;
+    use crate::identify::forces::asynchronous_lines::{AsynchronousLines, VibrationLine};
+    use crate::identify::forces::made_cuts::{
+        CONTACT_S, METAL, MILLED, changed, drilled, milled, turned, zero,
+    };
+    use approx::assert_relative_eq;
+
+    const HOLES: [f64; 4] = [900.0, 30.0, 700.0, 45.0];
+
+    /// The baseline at the coefficients that the cuts were made with.
+    fn at_truth(data: &CuttingData, truth: &[f64]) -> (CuttingModel, Vec<f64>) {
+        (CuttingModel::new(data, true).unwrap(), truth.to_vec())
+    }
+
+    /// Teeth added up in time and the closed form of their orders: the same waveform at the angle that the tool stood at.
+    #[test]
+    fn milled_waveforms_are_those_of_the_teeth_and_tell_the_tools_angle() {
+        let data = milled(METAL, &MILLED);
+        let (model, theta) = at_truth(&data, &METAL);
+        let fits = CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&theta)
+        .unwrap();
+        for ((cut, fit), way) in data.cuts.iter().zip(&fits).zip(MILLED) {
+            // Two teeth: the same after half a turn.
+            let off = (fit.placement - way[4]) / (0.5 * TAU);
+            assert!((off - off.round()).abs() < 1e-3, "{off}");
+            for (channel, fit) in cut.channels.iter().flatten().zip(fit.channels.iter().flatten()) {
+                for (recorded, model) in channel.orders.iter().zip(&fit.orders) {
+                    assert!((recorded - model).norm() < 0.2, "{recorded} {model} N");
+                }
+            }
+            // Some hundred values of 1 N error: what is left is the sum over slices.
+            assert!(fit.chi2 < 2.0, "{}", fit.chi2);
+        }
+    }
+
+    /// A force a hundredth too large stands at its share of the force over the noise; real and imaginary parts have half of it each.
+    #[test]
+    fn the_misfit_of_an_order_counts_twice_its_power_over_its_noise() {
+        let data = milled(METAL, &MILLED[..1]);
+        let (model, theta) = at_truth(&data, &METAL);
+        let larger: Vec<f64> = theta.iter().map(|t| 1.01 * t).collect();
+        let fit = &CuttingProblem {
+            model: &model,
+            data: &data,
+        }
+        .fits(&larger)
+        .unwrap()[0];
+        let channels = || data.cuts[0].channels.iter().flatten();
+        let orders: f64 = channels()
+            .flat_map(|c| &c.orders)
+            .map(|c| 2.0 * c.norm_sqr())
+            .sum();
+        // Six of fourteen blocks hold the force; a line through all takes away its mean: 6 · 8 / 14 is left of the square.
+        let levels: f64 = channels()
+            .map(|c| (c.level[5] - zero(5)).powi(2) * 48.0 / 14.0)
+            .sum();
+        assert_relative_eq!(fit.chi2, 1e-4 * (orders + levels), max_relative = 0.05);
+    }
+
+    #[test]
+    fn the_first_contact_of_a_drill_is_found() {
+        let data = drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0]]);
+        let (model, theta) = at_truth(&data, &HOLES);
+        let problem = CuttingProblem {
+            model: &model,
+            data: &data,
+        };
+        for fit in problem.fits(&theta).unwrap() {
+            assert_relative_eq!(fit.placement, CONTACT_S, epsilon = 1e-6);
+            assert!(fit.chi2 < 1e-6);
+            assert_relative_eq!(
+                fit.channels[2].as_ref().unwrap().reference[0],
+                zero(0),
+                max_relative = 1e-6
+            );
+        }
+    }
+
+    /// Without noise the misfit is a parabola about the truth, whose curvature is the slope of its slope: the angle of the tool and
+    /// the moment of contact follow the parameters, so that what they could explain is out of it.
+    #[test]
+    fn the_curvature_is_what_the_placement_leaves() {
+        let cases = [
+            (turned(METAL, &[0.1, 0.2]), METAL.to_vec()),
+            (milled(METAL, &MILLED[1..]), METAL.to_vec()),
+            (drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0]]), HOLES.to_vec()),
+        ];
+        for (data, truth) in cases {
+            let (model, theta) = at_truth(&data, &truth);
+            let problem = CuttingProblem {
+                model: &model,
+                data: &data,
+            };
+            let hessian = problem.linearise(&theta).unwrap().hessian;
+            for p in 0..theta.len() {
+                let h = 1e-4 * theta[p];
+                let slope = |sign: f64| {
+                    let mut moved = theta.clone();
+                    moved[p] += sign * h;
+                    problem.linearise(&moved).unwrap().gradient
+                };
+                let difference = (slope(1.0) - slope(-1.0)) / (2.0 * h);
+                for q in 0..theta.len() {
+                    let size = (hessian[(p, p)] * hessian[(q, q)]).sqrt();
+                    let off = (hessian[(p, q)] - difference[q]).abs() / size;
+                    assert!(
+                        off < 2e-3,
+                        "{:?} {p} {q}: {} {}",
+                        data.process,
+                        hessian[(p, q)],
+                        difference[q]
+                    );
+                }
+            }
+        }
+    }
+
+    /// Every effect on cutting forces, where nothing is special about the parameters.
+    #[test]
+    fn gradients_of_all_effects_are_the_slopes_of_the_misfit() {
+        let sets = [
+            turned(METAL, &[0.1, 0.3]),
+            milled(METAL, &MILLED[1..2]),
+            drilled(HOLES, &[[0.2, 0.0], [0.3, 3.0]]),
+        ];
+        for data in sets {
+            let base = CuttingModel::new(&data, true).unwrap();
+            for instance in Registry::cutting().instances(&()) {
+                let data = match instance.label().as_str() {
+                    "chatter" if data.process == crate::data::Process::Milling => vibrating(&data),
+                    "chatter" => continue,
+                    _ => data.clone(),
+                };
+                let model = base.with_effect(instance, &base.known(&data));
+                let mut theta = model.nominal_theta();
+                for (i, t) in theta.iter_mut().enumerate() {
+                    *t += 0.02 * t.abs().max(0.02) * (1.0 + 0.3 * i as f64);
+                }
+                let problem = CuttingProblem {
+                    model: &model,
+                    data: &data,
+                };
+                let here = problem.linearise(&theta).unwrap();
+                for (i, parameter) in model.parameters.iter().enumerate() {
+                    let h = 1e-6 * theta[i].abs().max(1e-2);
+                    let at = |sign: f64| {
+                        let mut moved = theta.clone();
+                        moved[i] += sign * h;
+                        problem.cost(&moved).unwrap()
+                    };
+                    let difference = (at(1.0) - at(-1.0)) / (2.0 * h);
+                    let scale = here.gradient[i]
+                        .abs()
+                        .max(difference.abs())
+                        .max(1e-9 * here.cost / h);
+                    assert!(
+                        (here.gradient[i] - difference).abs() < 5e-3 * scale.max(1e-9),
+                        "{:?} {} {}: {} {difference}",
+                        data.process,
+                        instance.label(),
+                        parameter.name,
+                        here.gradient[i]
+                    );
+                }
+            }
+        }
+    }
+
+    /// Lines at 431 Hz and two tooth passings to either side, N.
+    fn vibrating(data: &CuttingData) -> CuttingData {
+        let mut data = changed(data, |cut| {
+            let lines = (-2..=2).map(|shift: i64| VibrationLine {
+                shift,
+                channels: (0..3)
+                    .map(|c| (c, 20.0 / (1.0 + shift.abs() as f64), 0.5))
+                    .collect(),
+            });
+            cut.vibration = Some(AsynchronousLines {
+                frequency_hz: 431.0,
+                lines: lines.collect(),
+            });
+            cut.setting.has_vibration = true;
+        });
+        data.summary.vibration_hz = Some(431.0);
+        data
+    }
+
+    /// A limit cycle repeats to a quarter: lines that no model explains stand e times above their noise at four standard deviations.
+    #[test]
+    fn lines_without_a_model_count_by_their_height_above_the_noise() {
+        let plain = milled(METAL, &MILLED[..1]);
+        let seen = changed(&plain, |cut| {
+            cut.vibration = Some(AsynchronousLines {
+                frequency_hz: 431.0,
+                lines: vec![VibrationLine {
+                    shift: 1,
+                    channels: vec![(0, 0.5 * std::f64::consts::E, 0.5), (1, 0.5, 0.5)],
+                }],
+            });
+        });
+        let (model, theta) = at_truth(&plain, &METAL);
+        let chi2 = |data: &CuttingData| CuttingProblem { model: &model, data }.fits(&theta).unwrap()[0].chi2;
+        assert_relative_eq!(chi2(&seen) - chi2(&plain), 16.0, max_relative = 1e-6);
+        // Two values of amplitude and one of frequency more.
+        assert_eq!(seen.value_count(), plain.value_count() + 3);
+    }
+}

@@ -266,3 +266,152 @@ fn independent_share(data: &CuttingData, fits: &[CutFit]) -> f64 {
         .sum();
     1.0 / (1.0 + 2.0 * correlation)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned};
+    use approx::assert_relative_eq;
+    use rand::SeedableRng;
+
+    fn fitted(data: &CuttingData) -> Vec<CutFit> {
+        let model = CuttingModel::new(data, true).unwrap();
+        CuttingProblem { model: &model, data }.fits(&METAL).unwrap()
+    }
+
+    /// The same ripple of the tool in cuts that stood at different angles adds up to all of its χ²; of the contrary sign in each
+    /// second cut nothing is left of it.
+    #[test]
+    fn a_ripple_that_all_cuts_have_is_found_at_the_angle_of_the_tool() {
+        let data = milled(METAL, &[MILLED[0], MILLED[1]]);
+        let fits = fitted(&data);
+        let ripple = |signs: [f64; 2]| {
+            let mut data = data.clone();
+            for ((cut, fit), sign) in data.cuts.iter_mut().zip(&fits).zip(signs) {
+                let cut = std::sync::Arc::make_mut(cut);
+                for (channel, model) in cut
+                    .channels
+                    .iter_mut()
+                    .flatten()
+                    .zip(fit.channels.iter().flatten())
+                {
+                    channel.orders.clone_from(&model.orders);
+                }
+                // Order 3 of x: 4 N at an angle of the tool, recorded from the angle at which it stood; errors of 2 N.
+                let x = cut.channels[0].as_mut().unwrap();
+                x.orders[2] += Complex64::from_polar(4.0 * sign, 0.5 - 3.0 * fit.placement);
+                x.order_std[2] = 2.0;
+            }
+            common_wave(&data, &fits)
+        };
+        let (energy, values) = ripple([1.0, 1.0]);
+        // Two cuts of 2 · (4 N / 2 N)²; three channels of twelve orders.
+        assert_relative_eq!(energy, 16.0, max_relative = 1e-9);
+        assert_eq!(values, 72.0);
+        assert_relative_eq!(ripple([1.0, -1.0]).0, 0.0, epsilon = 1e-9);
+        // A cut that vibrates says nothing, and one alone has nothing in common.
+        let mut one_vibrates = data.clone();
+        std::sync::Arc::make_mut(&mut one_vibrates.cuts[0]).vibration =
+            Some(crate::identify::forces::asynchronous_lines::AsynchronousLines {
+                frequency_hz: 431.0,
+                lines: Vec::new(),
+            });
+        assert_eq!(common_wave(&one_vibrates, &fits), (0.0, 0.0));
+    }
+
+    /// Neighbours that share ρ leave (1 − ρ)/(1 + ρ) of the values independent (Bayley and Hammersley 1946).
+    #[test]
+    fn values_alike_their_neighbours_are_fewer_than_they_look() {
+        let data = milled(METAL, &MILLED[..1]);
+        let fits = fitted(&data);
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        for rho in [0.0f64, 0.5] {
+            let mut series = || {
+                let mut last = 0.0;
+                let next = |_| {
+                    last =
+                        rho * last + (1.0 - rho * rho).sqrt() * crate::statistics::nearly_normal(&mut random);
+                    last
+                };
+                (0..20_000).map(next).collect::<Vec<f64>>()
+            };
+            let (re, im) = (series(), series());
+            let noisy = changed(&data, |cut| {
+                cut.channels = [cut.channels[0].clone(), None, None, None];
+                let x = cut.channels[0].as_mut().unwrap();
+                // Errors of 3 N of all orders, those of the channel's levels are its own.
+                x.orders = re
+                    .iter()
+                    .zip(&im)
+                    .map(|(re, im)| Complex64::new(3.0 * re, 3.0 * im))
+                    .collect();
+                x.order_std = vec![3.0; x.orders.len()];
+            });
+            let mut own = fits.clone();
+            own[0].channels[0].as_mut().unwrap().orders = vec![Complex64::ZERO; re.len()];
+            let share = independent_share(&noisy, &own);
+            assert!(
+                (share - (1.0 - rho) / (1.0 + rho)).abs() < 0.03,
+                "{share} for {rho}"
+            );
+        }
+    }
+
+    /// Errors of a hundredth of every order, each of two real values with half of its variance.
+    #[test]
+    fn small_errors_are_a_hundredth_of_what_is_recorded() {
+        let data = changed(&milled(METAL, &MILLED[..1]), |cut| {
+            for channel in cut.channels.iter_mut().flatten() {
+                channel.orders = vec![Complex64::new(30.0, 40.0)];
+                channel.order_std = vec![2.0];
+            }
+        });
+        // Three channels of 2 · (0.01 · 50 N / 2 N)².
+        assert_relative_eq!(small_errors(&data), 3.0 * 2.0 * 0.0625, max_relative = 1e-12);
+    }
+
+    /// Cuts left out are predicted from the others: where all were made by one law there is no error, and its coefficients are found.
+    #[test]
+    fn turned_cuts_are_fitted_and_predicted() {
+        let data = turned(METAL, &[0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4]);
+        let model = CuttingModel::new(&data, true).unwrap();
+        let calibration = calibrate_cutting(&model, &data).unwrap();
+        for (parameter, truth) in calibration.parameters.iter().zip(METAL) {
+            assert_relative_eq!(parameter.value, truth, max_relative = 1e-4);
+        }
+        let held_out = held_out_cuts(&model, &data, &calibration.theta).unwrap().unwrap();
+        assert!(held_out.nrms() < 1e-5 && held_out.chi2 < 1e-3);
+        assert_eq!(held_out.by_fold.len(), 5);
+        assert!(cutting_nrms(&model, &data, &METAL).unwrap() < 1e-9);
+        let larger: Vec<f64> = METAL.iter().map(|k| 1.05 * k).collect();
+        assert_relative_eq!(
+            cutting_nrms(&model, &data, &larger).unwrap(),
+            0.05,
+            max_relative = 1e-6
+        );
+    }
+
+    /// Cuts of two metals: no coefficients for all of them, and the cuts' own fits say so.
+    #[test]
+    fn a_cut_of_another_metal_shows_as_unlike_the_others() {
+        let same = turned(METAL, &[0.1, 0.2, 0.3, 0.4]);
+        let rest = |data: CuttingData| {
+            let study = CuttingStudy::new(data);
+            let model = CuttingModel::new(&study.data, true).unwrap();
+            let theta = study.calibrate(&model).unwrap().theta;
+            study.rest(&model, &theta).unwrap()
+        };
+        let unlike = |rest: &Rest| {
+            rest.tests
+                .iter()
+                .find(|t| t.looks_like == LIKE_CUTS)
+                .map(|t| t.p_value)
+        };
+        assert!(unlike(&rest(same.clone())).is_none_or(|p| p > 0.1));
+        let mut other = same;
+        let harder = turned(METAL.map(|k| 1.5 * k), &[0.1, 0.2, 0.3, 0.4]);
+        other.cuts[3].clone_from(&harder.cuts[3]);
+        other.cuts[1].clone_from(&harder.cuts[1]);
+        assert!(unlike(&rest(other)).is_some_and(|p| p < 1e-6));
+    }
+}

@@ -246,4 +246,152 @@ mod tests {
         assert_eq!(left_out([0.0, 1.0], [1.9, 2.2]), None);
         assert_eq!(left_out([0.0, 1.0], [3.0, 3.5]), Some(2.0));
     }
+
+    use crate::identify::forces::cutting_model::CuttingModel;
+    use crate::identify::forces::cutting_problem::CuttingProblem;
+    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, drilled, middle_s, milled, turned};
+    use approx::assert_relative_eq;
+
+    fn fitted(data: &CuttingData, theta: &[f64]) -> Vec<CutFit> {
+        let model = CuttingModel::new(data, true).unwrap();
+        CuttingProblem { model: &model, data }.fits(theta).unwrap()
+    }
+
+    /// A model whose forces are 3 % too large is wrong by 3 % of the waveform's mean square, and by 20 log10 1.03 dB at each order.
+    #[test]
+    fn a_waveform_too_large_by_a_part_is_wrong_by_that_part() {
+        let larger = METAL.map(|k| 1.03 * k);
+        let data = milled(METAL, &MILLED[..2]);
+        for (cut, fit) in data.cuts.iter().zip(fitted(&data, &larger)) {
+            for axis in axis_waves(&data, cut, &fit) {
+                let sum = |f: fn(&WaveSums) -> f64| axis.orders.iter().map(f).sum::<f64>();
+                let (error, signal) = (sum(|s| s.error), sum(|s| s.signal));
+                assert_relative_eq!((error / signal).sqrt(), 0.03, max_relative = 0.03);
+                // The mean square of the drawn revolution, by adding it up.
+                let course = courses(&data, cut, &fit)
+                    .into_iter()
+                    .find(|c| c.axis == axis.axis)
+                    .unwrap();
+                let square = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64;
+                assert_relative_eq!(signal, square(&course.measured), max_relative = 1e-9);
+                let off: Vec<f64> = course
+                    .model
+                    .iter()
+                    .zip(&course.measured)
+                    .map(|(a, b)| a - b)
+                    .collect();
+                assert_relative_eq!(error, square(&off), max_relative = 1e-9);
+                // 1 N at each of twelve orders, twice, and in the mean of six blocks.
+                assert_relative_eq!(sum(|s| s.noise), 2.0 * 12.0 + 1.0 / 6.0, max_relative = 1e-12);
+                // Orders above five times their noise of 1 N are compared.
+                let loud = cut.channels[axis.axis.index()].as_ref().unwrap();
+                let loud = loud.orders.iter().filter(|c| c.norm() > 5.0).count();
+                assert_eq!(axis.decibel.1, loud);
+                assert!(loud >= 1 || axis.axis == ForceAxis::Z);
+                let expected = loud as f64 * 20.0 * 1.03f64.log10();
+                assert_relative_eq!(axis.decibel.0, expected, max_relative = 0.05);
+            }
+        }
+    }
+
+    /// What the tooth does to a drawn revolution: x and y are those of the tool, whatever way the dynamometer lies.
+    #[test]
+    fn recorded_channels_are_drawn_in_the_axes_of_the_tool() {
+        let plain = milled(METAL, &MILLED[..1]);
+        let fits = fitted(&plain, &METAL);
+        let expected = courses(&plain, &plain.cuts[0], &fits[0]);
+        // The dynamometer's x shows the tool's y, its y the tool's −x.
+        let minus = |channel: &ForceChannel, fit: &ChannelFit| {
+            let (mut channel, mut fit) = (channel.clone(), fit.clone());
+            for values in [&mut channel.level, &mut fit.level, &mut fit.reference] {
+                values.iter_mut().for_each(|v| *v = -*v);
+            }
+            channel
+                .orders
+                .iter_mut()
+                .chain(&mut fit.orders)
+                .for_each(|c| *c = -*c);
+            (channel, fit)
+        };
+        let mut fit = fits[0].clone();
+        let [x, y, ..] = &plain.cuts[0].channels;
+        let (minus_x, fit_minus_x) = minus(x.as_ref().unwrap(), fit.channels[0].as_ref().unwrap());
+        fit.channels[0] = fit.channels[1].take();
+        fit.channels[1] = Some(fit_minus_x);
+        let mut turned = changed(&plain, |cut| {
+            cut.channels[0] = y.clone();
+            cut.channels[1] = Some(minus_x.clone());
+        });
+        turned.tool_from_dyno = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        for (a, b) in courses(&turned, &turned.cuts[0], &fit).iter().zip(&expected) {
+            for (a, b) in a
+                .measured
+                .iter()
+                .chain(&a.model)
+                .zip(b.measured.iter().chain(&b.model))
+            {
+                assert_relative_eq!(*a, *b, epsilon = 1e-9);
+            }
+        }
+        // A missing channel is missing in the axes that need it alone.
+        let without = changed(&plain, |cut| cut.channels[0] = None);
+        let axes: Vec<ForceAxis> = axis_waves(&without, &without.cuts[0], &fits[0])
+            .iter()
+            .map(|a| a.axis)
+            .collect();
+        assert_eq!(axes, [ForceAxis::Y, ForceAxis::Z]);
+    }
+
+    /// Drilling: thrust and torque count alike, each block for itself. A torque is as large as the thrust when they are added up.
+    #[test]
+    fn torques_count_as_much_as_thrusts() {
+        let truth = [900.0, 30.0, 700.0, 45.0];
+        let data = drilled(truth, &[[0.2, 3.0], [0.3, 3.0]]);
+        let larger = truth.map(|k| 1.03 * k);
+        for (cut, fit) in data.cuts.iter().zip(fitted(&data, &larger)) {
+            let waves = axis_waves(&data, cut, &fit);
+            assert_eq!(
+                waves.iter().map(|w| w.axis).collect::<Vec<_>>(),
+                [ForceAxis::Z, ForceAxis::Mz]
+            );
+            let [thrust, torque] = [&waves[0], &waves[1]];
+            assert_eq!((thrust.orders.len(), torque.orders.len()), (1, 1));
+            assert!((0.3..3.0).contains(&(torque.orders[0].signal / thrust.orders[0].signal)));
+            assert_relative_eq!(thrust.orders[0].noise, 1.0, max_relative = 1e-12);
+            let factor = data.force_per_torque;
+            assert_relative_eq!(torque.orders[0].noise, factor * factor, max_relative = 1e-12);
+            let course = &courses(&data, cut, &fit)[1];
+            assert_eq!(course.x.len(), 14);
+            assert_relative_eq!(course.x[3], middle_s(3) - middle_s(0) + 0.05, max_relative = 1e-9);
+            let radius = f64::powi(4.75, 2) - f64::powi(1.5, 2);
+            let lever = radius / f64::to_radians(67.5).sin() / 1000.0;
+            let chip = 0.5 * cut.feed_mm * f64::to_radians(67.5).sin();
+            assert_relative_eq!(
+                course.measured[8],
+                lever * (900.0 * chip + 30.0),
+                max_relative = 0.02
+            );
+        }
+    }
+
+    #[test]
+    fn a_gap_in_the_hole_is_drawn_as_a_gap() {
+        let data = turned(METAL, &[0.1]);
+        let with_gap = changed(&data, |cut| {
+            for block in &mut cut.block_s[10..] {
+                block.iter_mut().for_each(|t| *t += 0.4);
+            }
+        });
+        let course = &courses(&with_gap, &with_gap.cuts[0], &fitted(&data, &METAL)[0])[0];
+        assert_eq!(course.x.len(), 15);
+        // Block 9 ends 1 s after the first begins, block 10 begins 0.4 s later.
+        assert_relative_eq!(course.x[10], 1.2, max_relative = 1e-9);
+        assert!(course.measured[10].is_nan() && course.model[10].is_nan());
+        assert_relative_eq!(
+            course.measured[5],
+            1.5 * (0.1 * METAL[1] + METAL[4]),
+            max_relative = 1e-6
+        );
+        assert_relative_eq!(course.model[5], course.measured[5], max_relative = 1e-6);
+    }
 }

@@ -171,4 +171,87 @@ mod tests {
         approx::assert_relative_eq!(sample_std(&samples), 3.0, max_relative = 0.02);
         assert_eq!(sample_std(&[1.0]), 0.0);
     }
+
+    use crate::identify::forces::asynchronous_lines::VibrationLine;
+    use approx::assert_relative_eq;
+    use std::f64::consts::TAU;
+
+    fn spectrum(rest: Vec<f64>) -> OrderSpectrum {
+        OrderSpectrum {
+            coefficient: Vec::new(),
+            std: Vec::new(),
+            sample_std: 0.1,
+            rest,
+            line_hz: 2.0,
+        }
+    }
+
+    /// Mean square over all phases of the mean of a line of `amplitude` at `hz` over `length_s`: by adding it up.
+    fn in_mean(amplitude: f64, hz: f64, length_s: f64) -> f64 {
+        let phases = 64;
+        (0..phases)
+            .map(|p| {
+                let phase = TAU * f64::from(p) / f64::from(phases);
+                let at = |i: i32| (TAU * hz * length_s * (f64::from(i) + 0.5) / 2000.0 + phase).cos();
+                (amplitude * (0..2000).map(at).sum::<f64>() / 2000.0).powi(2)
+            })
+            .sum::<f64>()
+            / f64::from(phases)
+    }
+
+    #[test]
+    fn a_line_leaves_in_a_mean_what_its_periods_do_not_cancel() {
+        // Of x = 2 Re X e^{iωt}, |X| = 3 N is an amplitude of 6 N; line 6 is 12 Hz, and a tenth of a second 1.2 of its periods.
+        let mut rest = vec![0.0; 20];
+        rest[6] = 3.0;
+        let left = lines_in_mean(&spectrum(rest.clone()), 1000.0, 0.1);
+        assert_relative_eq!(left, in_mean(6.0, 12.0, 0.1), max_relative = 1e-4);
+        // Lines add up; noise, and what is slower than the stretch, is none.
+        rest[8] = 2.0;
+        (rest[5], rest[4], rest[9]) = (0.0, 50.0, 0.013);
+        let both = lines_in_mean(&spectrum(rest.clone()), 1000.0, 0.1);
+        let expected = in_mean(6.0, 12.0, 0.1) + in_mean(4.0, 16.0, 0.1);
+        assert_relative_eq!(both, expected, max_relative = 1e-4);
+        // √10 times the noise of a line, 0.1 N · √(2 Hz / 1000 Hz), is a line.
+        rest[9] = 0.015;
+        let third = lines_in_mean(&spectrum(rest), 1000.0, 0.1);
+        assert_relative_eq!(third - both, in_mean(0.03, 18.0, 0.1), max_relative = 1e-3);
+    }
+
+    fn channel(orders: usize) -> ForceChannel {
+        ForceChannel {
+            orders: vec![Complex64::ZERO; orders],
+            order_std: vec![2.0; orders],
+            level: vec![0.0; 6],
+            level_std: vec![2.0; 6],
+            integral: vec![0.0; 6],
+        }
+    }
+
+    /// Lines of 40 N and 24 N beside the vibration's own (mean square 1088 N²) change the orders of tooth passing by a quarter of
+    /// themselves: (40² + 24²) / 2 / 4 / 16 = 17 N².
+    #[test]
+    fn a_vibration_widens_the_orders_of_tooth_passing_and_the_level_of_the_cut() {
+        let line = |shift: i64, amplitude: f64| VibrationLine {
+            shift,
+            channels: vec![(0, 500.0, 1.0), (2, amplitude.hypot(7.0), 7.0)],
+        };
+        let vibration = AsynchronousLines {
+            frequency_hz: 431.0,
+            lines: vec![line(-1, 40.0), line(0, 300.0), line(1, 24.0)],
+        };
+        let mut widened = channel(6);
+        widen_for_vibration(&mut widened, &vibration, 2, 3, 2..5);
+        let wide = (4.0f64 + 17.0).sqrt();
+        for (found, expected) in widened.order_std.iter().zip([2.0, 2.0, wide, 2.0, 2.0, wide]) {
+            assert_relative_eq!(*found, expected, max_relative = 1e-12);
+        }
+        for (found, expected) in widened.level_std.iter().zip([2.0, 2.0, wide, wide, wide, 2.0]) {
+            assert_relative_eq!(*found, expected, max_relative = 1e-12);
+        }
+        // A channel that shows no lines stays as it is.
+        let mut other = channel(6);
+        widen_for_vibration(&mut other, &vibration, 1, 3, 2..5);
+        assert_eq!(other.order_std, vec![2.0; 6]);
+    }
 }

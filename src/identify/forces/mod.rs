@@ -11,3 +11,5 @@ pub mod cutting_study;
 pub mod cutting_waves;
 pub(crate) mod cutting_windows;
 pub(crate) mod force_channel;
+#[cfg(test)]
+pub(crate) mod made_cuts;

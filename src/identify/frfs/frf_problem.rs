@@ -259,7 +259,7 @@ impl StructureModel {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
     use crate::effects::{self, Registry, Spot};
@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    fn model() -> StructureModel {
+    pub(in crate::identify::frfs) fn model() -> StructureModel {
         let point = |node, body| Point {
             node,
             body,
@@ -293,7 +293,7 @@ mod tests {
     }
 
     /// Two postures at two levels; a few lines; noise of 1 % of the magnitude.
-    fn data(model: &StructureModel) -> FrfData {
+    pub(in crate::identify::frfs) fn data(model: &StructureModel) -> FrfData {
         let blocks = TAP_POSTURES[..2]
             .iter()
             .enumerate()
@@ -408,6 +408,30 @@ mod tests {
                 }
                 agrees_with_differences(&model, &data, &theta, &format!("{instance:?}"));
             }
+        }
+    }
+
+    /// What the channels do to an FRF, a late and a turned sensor, in a second; the robot's own effects take longer, above.
+    #[test]
+    fn gradients_of_the_channels_agree_with_differences() {
+        let bare = model();
+        let data = data(&bare);
+        let summary = data.summary();
+        for labels in [
+            &["time-delay"][..],
+            &["sensor-misalignment"],
+            &["time-delay", "sensor-misalignment"],
+        ] {
+            let mut model = bare.clone();
+            for label in labels {
+                let instance = Registry::structure().find(&bare.robot.spec, label)[0];
+                model = model.with_effect(instance, &model.known(&summary));
+            }
+            let mut theta = model.nominal_theta();
+            for (i, t) in theta.iter_mut().enumerate() {
+                *t += 0.01 * (1.0 + i as f64).sin();
+            }
+            agrees_with_differences(&model, &data, &theta, &format!("{labels:?}"));
         }
     }
 

@@ -332,3 +332,45 @@ pub fn residual_peaks(predicted: &[Vec<Complex64>], data: &FrfData) -> Vec<Resid
     };
     peaks.into_iter().take(PEAKS).map(peak).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::frfs::frf_problem::tests::{data, model};
+    use approx::assert_relative_eq;
+
+    /// FRFs that are a tenth larger than the model's, known to 2 %: two postures of three FRFs of five lines.
+    fn larger(model: &StructureModel) -> FrfData {
+        let mut data = data(model);
+        let mut curves = model.predict(&model.nominal_theta(), &data).unwrap().into_iter();
+        for block in &mut data.blocks {
+            for frf in &mut std::sync::Arc::make_mut(block).frfs {
+                frf.receptance = curves.next().unwrap().iter().map(|h| h * 1.1).collect();
+                frf.noise_std = frf.receptance.iter().map(|h| 0.02 * h.norm()).collect();
+            }
+        }
+        data
+    }
+
+    /// Each line is off by a part of 0.1/1.1, which is 4.5 times its noise; real and imaginary part have half of its variance each.
+    #[test]
+    fn errors_are_shares_of_the_signal_and_multiples_of_the_noise() {
+        let model = model();
+        let study = StructureStudy::new(larger(&model), Options::default());
+        let theta = model.nominal_theta();
+        let part = 0.1f64 / 1.1;
+        let residual = study.residual(&model, &theta).unwrap();
+        assert_relative_eq!(residual.nrms, part, max_relative = 1e-9);
+        assert_relative_eq!(
+            residual.chi2_per_value,
+            (part / 0.02).powi(2),
+            max_relative = 1e-9
+        );
+        assert_eq!((study.folds(), study.real_values(Extent::Full)), (2, 2 * 30));
+        let fold = study.predict_fold(&model, &theta, 1).unwrap();
+        assert_relative_eq!(fold.nrms(), part, max_relative = 1e-9);
+        assert_relative_eq!(fold.chi2, 15.0 * 2.0 * (part / 0.02).powi(2), max_relative = 1e-9);
+        // Errors of a hundredth are half of the noise.
+        assert_relative_eq!(small_errors(&study.data), 30.0 * 2.0 * 0.25, max_relative = 1e-9);
+    }
+}

@@ -486,4 +486,28 @@ mod tests {
             "{random} {count}"
         );
     }
+
+    /// Random motion has E|a|⁴ = 2 (E|a|²)² and as many independent values as its band has lines; the envelope of a sine whose speed
+    /// wavers is constant.
+    #[test]
+    fn an_envelope_tells_random_motion_from_a_wavering_sine() {
+        let count = 20_000;
+        let random = noise(count, 7);
+        let mut phase = 0.0;
+        let wavering: Vec<f64> = noise(count, 8)
+            .iter()
+            .map(|x| {
+                phase += TAU * (0.15 + 0.004 * x);
+                phase.sin()
+            })
+            .collect();
+        let spectra = Spectra::new(&[random, wavering], 1000.0);
+        let (kurtosis, independent) = spectra.envelope(0, [100.0, 200.0]).unwrap();
+        assert!((kurtosis - 2.0).abs() < 0.2, "{kurtosis}");
+        // 100 Hz at 0.05 Hz.
+        assert!((independent / 2000.0 - 1.0).abs() < 0.1, "{independent}");
+        let (kurtosis, _) = spectra.envelope(1, [100.0, 200.0]).unwrap();
+        assert!(kurtosis < 1.1, "{kurtosis}");
+        assert_eq!(spectra.envelope(0, [100.0, 101.5]), None);
+    }
 }

@@ -377,4 +377,54 @@ mod tests {
         ));
         assert!(fit(&curve, 20.0, 0.01).is_none());
     }
+
+    /// Estimates under noise scatter by what is stated of them, however wide the peak is against its lines.
+    #[test]
+    fn stated_errors_are_the_scatter_under_noise() {
+        for zeta in [0.01, 0.05] {
+            let fits: Vec<CircleFit> = (0..300)
+                .map(|seed| {
+                    let modes = [SyntheticMode::new(20.03, zeta, 2.0)];
+                    let noisy = Synthetic::new(14.0, 26.0, 0.1, &modes).with_noise(0.02, 0.0, seed);
+                    fit(&curve_of(noisy), 20.0, zeta).unwrap()
+                })
+                .collect();
+            let agree = |value: fn(&CircleFit) -> f64, stated: fn(&CircleFit) -> f64| {
+                let n = fits.len() as f64;
+                let mean = fits.iter().map(value).sum::<f64>() / n;
+                let scatter =
+                    (fits.iter().map(|f| (value(f) - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+                let stated = (fits.iter().map(|f| stated(f).powi(2)).sum::<f64>() / n).sqrt();
+                assert!(
+                    (0.8..1.25).contains(&(stated / scatter)),
+                    "{zeta}: {stated} stated, {scatter} seen"
+                );
+            };
+            agree(|f| f.frequency_hz, |f| f.frequency_std_hz);
+            agree(|f| f.damping_ratio, |f| f.damping_std);
+        }
+    }
+
+    /// The points of a circle are on it: centre and radius of three and more of them, wherever it lies.
+    #[test]
+    fn a_circle_is_found_from_an_arc_of_it() {
+        let points: Vec<Complex64> = (0..8)
+            .map(|k| Complex64::new(3.0, -7.0) + Complex64::from_polar(2.5, 0.3 * f64::from(k)))
+            .collect();
+        let circle = Circle::fit(&points).unwrap();
+        assert!((circle.centre - Complex64::new(3.0, -7.0)).norm() < 1e-9);
+        approx::assert_relative_eq!(circle.radius, 2.5, max_relative = 1e-9);
+        let line: Vec<Complex64> = (0..8).map(|k| Complex64::new(f64::from(k), 2.0)).collect();
+        assert!(Circle::fit(&line).is_none());
+    }
+
+    /// Two and a half turns are five half turns, not one.
+    #[test]
+    fn angles_go_on_over_full_turns() {
+        let points: Vec<Complex64> = (0..=25)
+            .map(|k| Complex64::new(1.0, 1.0) + Complex64::from_polar(1.0, -0.2 * PI * f64::from(k)))
+            .collect();
+        let turned = angles(&points, Complex64::new(1.0, 1.0));
+        approx::assert_relative_eq!(turned[25] - turned[0], -5.0 * PI, max_relative = 1e-9);
+    }
 }

@@ -255,4 +255,36 @@ mod tests {
         assert_eq!(result.reached, [true, false]);
         approx::assert_relative_eq!(result.damping_ratio, 0.02, max_relative = 1e-6);
     }
+
+    /// Estimates under noise scatter by what is stated of them.
+    #[test]
+    fn stated_errors_are_the_scatter_under_noise() {
+        for zeta in [0.02, 0.05] {
+            let fits: Vec<HalfPower> = (0..300)
+                .map(|seed| {
+                    let modes = [SyntheticMode::new(20.03, zeta, 2.0)];
+                    let (f, h) = Synthetic::new(14.0, 26.0, 0.05, &modes)
+                        .with_noise(0.02, 0.0, seed)
+                        .frf();
+                    let curve = Curve::from_receptance(&f, &h, None).unwrap();
+                    let peak = curve.nearest(20.03);
+                    fit(&curve, peak, 0.0).unwrap()
+                })
+                .collect();
+            let agree = |value: fn(&HalfPower) -> f64, stated: fn(&HalfPowerStd) -> f64| {
+                let n = fits.len() as f64;
+                let mean = fits.iter().map(value).sum::<f64>() / n;
+                let scatter =
+                    (fits.iter().map(|f| (value(f) - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
+                let of = |f: &HalfPower| stated(&f.std.unwrap()).powi(2);
+                let stated = (fits.iter().map(of).sum::<f64>() / n).sqrt();
+                assert!(
+                    (0.75..1.35).contains(&(stated / scatter)),
+                    "{zeta}: {stated} stated, {scatter} seen"
+                );
+            };
+            agree(|f| f.frequency_hz, |s| s.frequency_hz);
+            agree(|f| f.damping_ratio, |s| s.damping_ratio);
+        }
+    }
 }

@@ -244,4 +244,40 @@ mod tests {
             assert!(orders.iter().all(|o| o.poles.is_empty()));
         }
     }
+
+    /// Two responses to hits at two points, one of them hit harder: the poles of three modes, of which two nearly coincide, with one
+    /// denominator for both references.
+    #[test]
+    fn two_references_share_their_poles() {
+        let shared = [(8.0, 0.03), (8.3, 0.03), (30.0, 0.02)];
+        let shapes = [[1.0, 0.5], [0.6, -1.0], [0.8, 0.9]];
+        let frf = |response: usize, reference: usize| {
+            let gain = [1.0, 3.0][reference];
+            let constants = shapes.map(|s| 0.01 * gain * s[response] * s[reference]);
+            Synthetic::new(3.0, 60.0, 0.25, &SyntheticMode::row(&shared, &constants)).frf()
+        };
+        let curves = [0, 1].map(|response| [0, 1].map(|reference| frf(response, reference)));
+        let rows: Vec<Row> = curves
+            .iter()
+            .map(|[one, two]| Row {
+                frequency_hz: &one.0,
+                receptance: vec![&one.1, &two.1],
+                weight: one
+                    .1
+                    .iter()
+                    .zip(&two.1)
+                    .map(|(a, b)| 1.0 / a.norm().hypot(b.norm()))
+                    .collect(),
+            })
+            .collect();
+        let orders = poles(&rows, [3.0, 60.0], 8);
+        let last = &orders.last().unwrap().poles;
+        for (frequency_hz, damping_ratio) in shared {
+            let found = last.iter().any(|p| {
+                (p.frequency_hz / frequency_hz - 1.0).abs() < 1e-3
+                    && (p.damping_ratio / damping_ratio - 1.0).abs() < 0.05
+            });
+            assert!(found, "{frequency_hz} Hz in {last:?}");
+        }
+    }
 }

@@ -82,3 +82,25 @@ pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a harmonic motion the velocity is iω times, the acceleration −ω² times the displacement.
+    #[test]
+    fn powers_of_i_omega_are_derivatives() {
+        let omega = std::f64::consts::TAU * 10.0;
+        let close = |power: i32, re: f64, im: f64| {
+            let expected = Complex64::new(re, im);
+            assert!(
+                (factor(10.0, power) - expected).norm() < 1e-9 * expected.norm(),
+                "{power}"
+            );
+        };
+        close(1, 0.0, omega);
+        close(2, -omega * omega, 0.0);
+        close(-1, 0.0, -1.0 / omega);
+        close(-2, -1.0 / (omega * omega), 0.0);
+    }
+}

@@ -189,4 +189,32 @@ mod tests {
             }
         }
     }
+
+    /// Each joint loses its own share: what is added to a joint's spring is that spring times its loss factor.
+    #[test]
+    fn every_joint_has_its_own_loss() {
+        let model = RobotModel::new(irb6640());
+        let kinematics = model.kinematics(&TAP_POSTURES[0]).unwrap();
+        let mut chain = model.chain(&kinematics, &Baseline::nominal(&model.spec));
+        let setting = PostureSetting::of_tests(&model, &kinematics);
+        let at = At {
+            site: Site::Everywhere,
+            variant: 0,
+        };
+        let losses = [0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.0];
+        HystereticDamping.apply(at, &losses.map(Dual::constant), &setting, &mut chain);
+        for (index, element) in chain.elements.iter().enumerate() {
+            let Role::Joint(joint) = element.role else {
+                continue;
+            };
+            let own: Vec<f64> = chain
+                .attachments
+                .iter()
+                .filter(|a| a.grip.coordinates == [(index, 1.0)])
+                .map(|a| a.size.value / element.stiffness.value)
+                .collect();
+            assert_eq!(own.len(), 1);
+            approx::assert_relative_eq!(own[0], 0.01 * joint as f64, max_relative = 1e-12);
+        }
+    }
 }

@@ -592,7 +592,7 @@ mod tests {
     /// that comes and goes is not.
     #[test]
     fn a_line_that_comes_and_goes_is_constant_while_it_is_there() {
-        let n = 16_384;
+        let n = 65_536;
         let there = |k: usize| if k < n / 3 { 1.0 } else { 0.03 };
         let mut random = ChaCha8Rng::seed_from_u64(9);
         let (mut phase, mut offset) = (0.0, 0.0);

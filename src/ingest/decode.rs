@@ -6,9 +6,10 @@ use super::budget::Budget;
 use super::contents::{Contents, Format, count};
 use super::detect::{self, Detected};
 use super::text::{self, Notes};
+use super::units::figures;
 use super::{checks, dof_names};
 use crate::InputError;
-use crate::data::FrfRecord;
+use crate::data::{FrfRecord, TimeRecord};
 use crate::ingest::formats::mat::NamedArrays;
 use crate::ingest::formats::{force, frf_text, lvm, numpy, tdms, uff, workbook};
 use crate::ingest::tables::{channel_names, stamps};
@@ -49,12 +50,29 @@ pub(super) fn read_bytes_at(
         Ok((format, why, mut contents)) => {
             for record in &mut contents.times {
                 channel_names::settle(&mut record.channels, notes);
+                tell_slow_times(record, notes);
             }
             contents.show_control_characters();
             checks::drop_copies(&mut contents.frfs, notes);
             Ok((format, text::shown(&why).into_owned(), contents))
         }
         Err(error) => Err(error),
+    }
+}
+
+/// Samples of which a record has more.
+const A_FEW: usize = 200;
+
+/// Says where the times go up by a second or more from sample to sample: nobody records vibration or force so, and a column `time`
+/// may as well hold milliseconds, or count the samples.
+fn tell_slow_times(record: &TimeRecord, notes: &mut Notes) {
+    if record.sample_rate_hz <= 1.0 && record.len() >= A_FEW {
+        notes.file(format!(
+            "{} samples, one every {} s, if the times are seconds: milliseconds, or a count of samples? Then name the column time_ms, or say \
+             how fast it was sampled (`lobestone modal FILE --rate HZ`; for cutting forces rate_hz in a [[channel]] of campaign.toml)",
+            record.len(),
+            figures(1.0 / record.sample_rate_hz, 4)
+        ));
     }
 }
 

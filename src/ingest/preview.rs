@@ -10,6 +10,10 @@ use crate::{Error, Result};
 
 /// Rows that are looked at; [`PlainColumn::how_far`] tells it.
 const ROWS: usize = 2000;
+/// Columns that are described one by one.
+const SHOWN: usize = 12;
+/// More columns than any recorder has channels: rows and columns may be exchanged.
+const MANY: usize = 200;
 /// Bytes read of a file to see them.
 const START: u64 = 1 << 20;
 
@@ -140,14 +144,27 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
             has_time = true;
         }
     }
+    let more = match seen.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        n => format!("; and {n} more"),
+    };
     let what = format!(
-        "{} columns of numbers without names ({}{})",
+        "{} columns of numbers without names ({}{more}{})",
         header.columns,
-        seen.join("; "),
+        seen[..seen.len().min(SHOWN)].join("; "),
         columns.first().map_or_else(String::new, PlainColumn::how_far)
     );
+    let rows = columns.first().map_or(0, |c| c.rows);
+    let turned = if header.columns > MANY && header.columns > 10 * rows {
+        format!(
+            "{rows} rows of {} numbers are one row a channel: exchange rows and columns first (one row a sample); then ",
+            header.columns
+        )
+    } else {
+        String::new()
+    };
     let remedy = format!(
-        "put a line of column names on top (frequency_hz,re,im for an FRF; time_s,force_n,acc_m_per_s2 for a tap test; \
+        "{turned}put a line of column names on top (frequency_hz,re,im for an FRF; time_s,force_n,acc_m_per_s2 for a tap test; \
          time_s,fx_n,fy_n,fz_n for cutting forces), or, for cutting forces, say in campaign.toml what they are (`lobestone init` \
          writes and asks it), such as{lines}"
     );

@@ -441,6 +441,121 @@ fn columns_that_header_lines_describe() {
     assert_eq!(contents.frfs[1].quantity, Some(Quantity::Accelerance));
 }
 
+/// Brüel & Kjær's PULSE: header lines say what the columns are, lines of words stand below the rows.
+#[test]
+fn exports_of_pulse() {
+    let export = |data_type: &str, unit: &str, function: &str, over: &str, rows: &str| {
+        format!(
+            "Header Size:\t 79\t \t \r\nPulse Version:\t 80\t \t \r\nDecimal Symbol:\t.\t \t \r\nData Type:\t{data_type}\t \t \r\n\
+             X-Axis unit:\t{over}\t \t \r\n\t \t \t \r\nAmplitudeUnit:\t{unit}\t \t \r\nFunction:\t{function}\t \t \r\n\
+             Ref_Signal:\thammer\t \t \r\nSignal:\tPCB3\t \t \r\nTitle:\t{function} H1(PCB3,hammer)\t \t \r\n\
+             Z-index:\t \t1\t \r\nTime:\t \t10:53:34:432\t \r\nZ-axis:\t \t 0.0000000000e+000\t \r\n{rows}\
+             TagsBegin:\t \t \t \r\nOverLoad:\t \tFalse\t \r\nAverageNumber: []\t \t 3.00000e+000\t \r\nTagsEnd:\t \t \t \r\n"
+        )
+    };
+    let rows: String = (0..5)
+        .map(|k| {
+            format!(
+                "{}\t {:.10e}\t{:e}\t{:e}\t \r\n",
+                k + 1,
+                0.25 * f64::from(k),
+                1 + k,
+                -k
+            )
+        })
+        .collect();
+    // Latin-1, as the program writes it.
+    let bytes = |text: String| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+    let frf = export("Complex", "(m/s²)/N", "Frequency Response", "Hz", &rows);
+    let (_, contents, warnings) = read(bytes(frf));
+    let found = &contents.frfs[0];
+    assert_eq!(found.quantity, Some(Quantity::Accelerance));
+    assert_eq!(found.frequency_hz, [0.0, 0.25, 0.5, 0.75, 1.0]);
+    assert_eq!(found.value[2], Complex64::new(3.0, -2.0));
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("lines below the last row, from \"TagsBegin:\" on")),
+        "{warnings:?}"
+    );
+    let cross = export("Complex", "(m/s²)N", "Cross-spectrum", "Hz", &rows);
+    assert!(problem(bytes(cross)).contains("a PULSE export of Cross-spectrum over Hz"));
+    let rows: String = (0..5)
+        .map(|k| format!("{}\t {:.10e}\t{:e}\t \r\n", k + 1, 0.5e-3 * f64::from(k), k))
+        .collect();
+    let (record, _) = time(bytes(export("Real", "m/s²", "Time", "s", &rows)));
+    assert_eq!(record.sample_rate_hz, 2000.0);
+    let signal = record.channels.iter().find(|c| c.name == "PCB3").unwrap();
+    assert_eq!((signal.quantity_and_unit().1, signal.samples[3]), ("m/s²", 3.0));
+    let spectrum = export("Real", "(m/s²)²", "Autospectrum", "Hz", &rows);
+    assert!(problem(bytes(spectrum)).contains("Autospectrum"));
+}
+
+/// A running number in front, with a name or without (pandas).
+#[test]
+fn frf_tables_behind_a_running_number() {
+    for name in ["", "Unnamed: 0", "No.", "index"] {
+        let (_, contents, _) = read(format!(
+            "{name},Frequency (Hz),Real,Imag\n0,1.0,2,3\n1,1.5,4,5\n2,2.0,6,7\n3,2.5,8,9\n"
+        ));
+        assert_eq!(contents.frfs[0].frequency_hz, [1.0, 1.5, 2.0, 2.5], "{name}");
+        assert_eq!(contents.frfs[0].value[1], Complex64::new(4.0, 5.0));
+    }
+}
+
+/// Autospectra over Hz beside which a window is named are no record over time.
+#[test]
+fn spectra_of_an_analyser_are_no_times() {
+    let table = "CSVFormatType;Spectrum2DReal\nAxisUnit;Hz\nSignals;2\n;\nName;Signal 1;Signal 2\n\
+        FunctionType;SpectrumAuto;SpectrumAuto\nUnit;(N)^2;(m/s^2)^2\nTimeWeighting;Hanning;Hanning\n;\n\
+        ';Signal 1;Signal 2\n';(N)^2;(m/s^2)^2\n0,0;1,5;4,0\n0,5;2,5;5,0\n1,0;3,5;6,0\n1,5;3,5;6,0\n";
+    let told = problem(table);
+    assert!(
+        told.contains("spectra over Hz (SpectrumAuto) without phases"),
+        "{told}"
+    );
+}
+
+#[test]
+fn lines_below_a_table_are_left_out_and_told() {
+    let rows = "time_s,fx_n\n0,1\n0.001,2\n0.002,3\n0.003,4\n";
+    let (record, warnings) = time(format!("{rows}EOF\n"));
+    assert_eq!(record.channels[0].samples, [1.0, 2.0, 3.0, 4.0]);
+    assert!(
+        warnings.iter().any(|w| w.contains("1 lines below the last row")),
+        "{warnings:?}"
+    );
+    // Words within a table are still an error, with their line.
+    assert!(problem(format!("{rows}Cycle: 2\n0.004,5\n")).contains("2 numbers are expected here"));
+}
+
+/// Milliseconds called time, or a count of samples.
+#[test]
+fn times_that_go_up_by_a_second_or_more_are_told() {
+    let table = |step: usize| -> String {
+        let rows = (0..300).map(|k| format!("{},{}\n", k * step, (k * 7) % 13));
+        std::iter::once("time,fx_n\n".to_owned()).chain(rows).collect()
+    };
+    for step in [1, 10] {
+        let (_, warnings) = time(table(step));
+        let told = format!("300 samples, one every {step}.0");
+        assert!(warnings.iter().any(|w| w.contains(&told)), "{warnings:?}");
+    }
+}
+
+/// A row for each channel: a message that can be read, and says what to do.
+#[test]
+fn rows_and_columns_exchanged_are_told() {
+    let row: Vec<String> = (0..3000).map(|k| format!("{}.5", (k * 7) % 11)).collect();
+    let told = problem(format!("{0}\n{0}\n{0}\n{0}\n{0}\n", row.join(" ")));
+    assert!(told.len() < 3000, "{}", told.len());
+    assert!(told.contains("and 2988 more"), "{told}");
+    assert!(
+        told.contains("5 rows of 3000 numbers are one row a channel"),
+        "{told}"
+    );
+}
+
 #[test]
 fn times_without_names_are_no_frequencies() {
     let record: String = (0..200)

@@ -272,7 +272,8 @@ fn named_in_any_case(name: &str) -> Option<(f64, Dimension)> {
     use Dimension as D;
     Some(match name.to_lowercase().as_str() {
         "sec" | "second" | "seconds" => (1.0, D::TIME),
-        "msec" => (1e-3, D::TIME),
+        "msec" | "millisecond" | "milliseconds" => (1e-3, D::TIME),
+        "usec" | "µsec" | "μsec" | "microsecond" | "microseconds" => (1e-6, D::TIME),
         "micron" => (1e-6, D::LENGTH),
         "inch" => (INCH, D::LENGTH),
         "n" | "newton" | "newtons" => (1.0, D::FORCE),
@@ -305,9 +306,8 @@ pub fn parse_suffix(suffix: &str) -> Option<Unit> {
         "m_s" => parse("m/s"),
         "mm_s" => parse("mm/s"),
         other if other.contains('/') => parse(other),
-        "mm" | "um" | "m" | "s" | "ms" | "g" | "n" | "kn" | "lbf" | "v" | "mv" | "ncm" | "nmm" | "kgf" => {
-            parse(&suffix)
-        }
+        "mm" | "um" | "m" | "s" | "ms" | "us" | "µs" | "μs" | "g" | "n" | "kn" | "lbf" | "v" | "mv"
+        | "ncm" | "nmm" | "kgf" => parse(&suffix),
         other if other.contains("_per_") => parse(&other.replace("_per_", "/")),
         _ => None,
     }
@@ -419,6 +419,11 @@ mod tests {
             );
         }
         assert_relative_eq!(parse_named("acc_mm_s2").unwrap().factor, 1e-3);
+        // Loggers of microcontrollers count microseconds.
+        for label in ["time_us", "time_µs", "usec", "microseconds"] {
+            let unit = parse_named(label).unwrap();
+            assert_eq!((unit.dimension, unit.factor), (Dimension::TIME, 1e-6), "{label}");
+        }
         assert_eq!(parse_suffix("x"), None);
         assert_eq!(parse_suffix("left"), None);
     }

@@ -15,6 +15,10 @@ const STANDS_OUT: f64 = 6.0;
 const FLANK_OF_PEAK: f64 = 0.015;
 /// … and in the same proportion to it in all FRFs: the common denominator. (Squared coherence; a sine has phases of its own.)
 const IN_PROPORTION: f64 = 0.5;
+/// Where half of the FRFs show flanks by themselves, so many standard deviations high and at least this part of the peak, it is a
+/// resonance too: one that moves from FRF to FRF (a roving sensor's mass, a warming structure) has no common proportion.
+const OWN_FLANKS: f64 = 5.0;
+const OWN_FLANK_OF_PEAK: f64 = 0.1;
 /// FRFs that sines are looked for in, at most.
 const ENOUGH_FRFS: usize = 40;
 /// Mains frequencies, Hz.
@@ -132,6 +136,7 @@ impl Flanks {
         let mut stands_out = vec![Vec::new(); 2 * SPREAD + 1];
         let (mut peak, mut flank, mut flank_noise) = (0.0, 0.0, 0.0);
         let mut both = Complex64::ZERO;
+        let (mut own_flanks, mut own_shares) = (Vec::new(), Vec::new());
         for h in frfs {
             let value = |x: f64| h[(k as f64 + x) as usize];
             let term = |t: usize| -> Complex64 {
@@ -162,6 +167,8 @@ impl Flanks {
             flank += resonance.norm_sqr() / variance;
             both += resonance.conj() * (value(0.0) - constant) / variance;
             flank_noise += self.variance[1];
+            own_flanks.push((resonance.norm_sqr() / (variance * self.variance[1])).sqrt());
+            own_shares.push(resonance.norm() / (value(0.0) - constant).norm().max(f64::MIN_POSITIVE));
         }
         let middles: Vec<f64> = stands_out
             .iter()
@@ -180,6 +187,11 @@ impl Flanks {
         }
         let flanks = flank > FLANK_OF_PEAK * FLANK_OF_PEAK * peak + 1.5 * flank_noise;
         if flanks && both.norm_sqr() > IN_PROPORTION * flank * peak {
+            return None;
+        }
+        if crate::signal::median(&own_flanks) > OWN_FLANKS
+            && crate::signal::median(&own_shares) > OWN_FLANK_OF_PEAK
+        {
             return None;
         }
         let mut low = k;
@@ -231,6 +243,30 @@ mod tests {
         assert_eq!(found[0].frequency_hz, 100.0);
         assert!(found[0].spoils_hz[0] <= 99.5 && found[0].spoils_hz[1] >= 100.5);
         assert_eq!(found[0].what, "harmonic 2 of the 50 Hz mains");
+    }
+
+    /// A sensor that is moved from place to place moves a light structure's frequencies with it.
+    #[test]
+    fn a_narrow_resonance_that_moves_from_frf_to_frf_is_none() {
+        for size in [0.15, 0.4] {
+            let mut frequency = Vec::new();
+            let frfs: Vec<Vec<Complex64>> = (0..10)
+                .map(|k| {
+                    let f0 = 100.1 + size * (f64::from(k) * 2.4).sin();
+                    let modes = [
+                        SyntheticMode::new(60.0, 0.01, 1.0),
+                        SyntheticMode::new(f0, 5e-4, 1.0),
+                    ];
+                    let (f, h) = Synthetic::new(5.0, 200.0, 0.5, &modes)
+                        .with_noise(0.0, 0.01, k as u64)
+                        .frf();
+                    frequency = f;
+                    h
+                })
+                .collect();
+            let found = sine_lines(&frequency, &frfs.iter().map(|h| h.as_slice()).collect::<Vec<_>>());
+            assert!(found.is_empty(), "{size}: {found:?}");
+        }
     }
 
     /// Also where its half-power band is a small part of a line.

@@ -46,6 +46,9 @@ pub fn find_faults(samples: &[f64]) -> Faults {
             ..Faults::default()
         };
     }
+    if is_a_switch(samples) {
+        return Faults::default();
+    }
     let spikes = spikes(samples);
     let range = extremes(samples, &spikes);
     let runs = runs(samples);
@@ -56,11 +59,18 @@ pub fn find_faults(samples: &[f64]) -> Faults {
         };
     }
     let windowed = is_windowed(samples, &runs);
-    let clipping = clipping(samples, &runs, range).filter(|c| !(windowed && c.level == 0.0));
+    let stands = |level: f64| {
+        runs.iter()
+            .any(|run| run.len() >= PLATEAU && samples[run.start] == level)
+    };
+    let rests = |level: &f64| stands(*level) && is_rest(samples, *level);
+    let at_rest: Vec<f64> = [range.0, range.1].into_iter().filter(rests).collect();
+    let clipping = clipping(samples, &runs, range, &at_rest).filter(|c| !(windowed && c.level == 0.0));
     let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
     let stuck = runs
         .into_iter()
         .filter(|run| run.len() >= STUCK && !clipped(run) && !(windowed && samples[run.start] == 0.0))
+        .filter(|run| !at_rest.contains(&samples[run.start]))
         .collect();
     Faults {
         dead: false,
@@ -68,6 +78,44 @@ pub fn find_faults(samples: &[f64]) -> Faults {
         stuck,
         clipping,
     }
+}
+
+/// Values of a channel that is no measurement but a state: a trigger …
+const STATES: usize = 8;
+/// … or a tool number, a program line: more of them, each held for a while.
+const STATES_HELD: usize = 64;
+/// Samples that a state is held for, on average.
+const HELD: usize = 20;
+/// Samples from which so few values cannot be chance.
+const ENOUGH_FOR_STATES: usize = 1000;
+
+/// A channel that knows a few values only rests at them and steps between them by nature.
+fn is_a_switch(samples: &[f64]) -> bool {
+    if samples.len() < ENOUGH_FOR_STATES {
+        return false;
+    }
+    let changes = samples
+        .windows(2)
+        .filter(|w| w[0] != w[1])
+        .take(samples.len() / HELD + 1);
+    let most = if changes.count() > samples.len() / HELD {
+        STATES
+    } else {
+        STATES_HELD
+    };
+    let mut states: Vec<f64> = Vec::with_capacity(most);
+    for sample in samples {
+        // The one seen last is the likeliest.
+        if let Some(at) = states.iter().rposition(|s| s == sample) {
+            let last = states.len() - 1;
+            states.swap(at, last);
+        } else if states.len() == most {
+            return false;
+        } else {
+            states.push(*sample);
+        }
+    }
+    true
 }
 
 /// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
@@ -164,8 +212,33 @@ fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
     })
 }
 
+/// A level at which peaks are cut off holds so many times the samples of the value next to it: all that would have gone beyond.
+/// Where a signal rests in few digits, the value next to its rest is seen as often.
+const PILED_UP: usize = 4;
+
+/// True where samples stand at `level` because the signal rests there, with the values next to it in its steps as frequent.
+fn is_rest(samples: &[f64], level: f64) -> bool {
+    let next = samples
+        .iter()
+        .filter(|v| **v != level)
+        .fold(f64::INFINITY, |least: f64, v| {
+            if (v - level).abs() < (least - level).abs() {
+                *v
+            } else {
+                least
+            }
+        });
+    let count = |value: f64| samples.iter().filter(|v| **v == value).count();
+    PILED_UP * count(next) > count(level)
+}
+
 /// At least two plateaus at one of the extreme values.
-fn clipping(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, f64)) -> Option<Clipping> {
+fn clipping(
+    samples: &[f64],
+    runs: &[Range<usize>],
+    (low, high): (f64, f64),
+    at_rest: &[f64],
+) -> Option<Clipping> {
     [high, low].into_iter().find_map(|level| {
         let plateaus: Vec<Range<usize>> = runs
             .iter()
@@ -173,7 +246,7 @@ fn clipping(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, f64)) -> 
             .cloned()
             .collect();
         // A single long one is a stuck channel rather than a peak cut off.
-        (plateaus.len() >= 2).then_some(Clipping { level, plateaus })
+        (plateaus.len() >= 2 && !at_rest.contains(&level)).then_some(Clipping { level, plateaus })
     })
 }
 
@@ -320,6 +393,31 @@ mod tests {
             faults(|v| v[2000..].iter_mut().for_each(|v| *v += 2000.0)),
             Faults::default()
         );
+    }
+
+    /// A trigger, a tool number; a current in whole steps that rests at its least.
+    #[test]
+    fn states_and_a_rest_in_few_digits_are_no_faults() {
+        let switch: Vec<f64> = (0..4000).map(|i| f64::from((i / 700) % 2)).collect();
+        assert_eq!(find_faults(&switch), Faults::default());
+        let tool: Vec<f64> = (0..4000).map(|i| f64::from((i / 150 * 7) % 19)).collect();
+        assert_eq!(find_faults(&tool), Faults::default());
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        let current: Vec<f64> = (0..8000)
+            .map(|i| {
+                let idle: f64 = random.random_range(0.6..2.6);
+                let cut: f64 = random.random_range(200.0..900.0);
+                if (i / 1000) % 2 == 0 {
+                    idle.round()
+                } else {
+                    cut.round()
+                }
+            })
+            .collect();
+        assert_eq!(find_faults(&current).clipping, None);
+        // Cut off in whole steps: piled up at the end of the range.
+        let cut_off: Vec<f64> = signal().iter().map(|v| v.round().min(60.0)).collect();
+        assert_eq!(find_faults(&cut_off).clipping.map(|c| c.level), Some(60.0));
     }
 
     #[test]

@@ -16,6 +16,8 @@ use crate::{Error, InputError, Result};
 pub struct FrfReading {
     /// What FRFs are where their file does not say.
     pub unsaid: Quantity,
+    /// Where the other files all say the same, those that do not say are taken for that instead.
+    pub unsaid_like_the_rest: bool,
     /// FRF files were measured with an exponential window e^(−decay t) on the responses (and the force): what it added to the damping
     /// is taken out. 1/s.
     pub added_decay_per_s: f64,
@@ -32,8 +34,53 @@ pub(crate) struct Told {
     pub hits: Vec<(String, Vec<Hit>)>,
     /// What was assumed or left out.
     pub warnings: Vec<String>,
+    /// What FRFs of the files say that they are.
+    said: Vec<Quantity>,
+    /// FRFs of files that do not say.
+    unsaid: Vec<Unsaid>,
     /// Raw records without a good hit: they are left out, and told among the warnings.
     pub refused: Vec<Error>,
+}
+
+/// FRFs of a file that does not say what they are.
+#[derive(Debug)]
+struct Unsaid {
+    file: String,
+    /// Their names, as in [`FrfInput::name`].
+    names: Vec<String>,
+}
+
+/// FRFs that were read as `reading.unsaid` for want of better, beside files that say what theirs are: made what those are, and told.
+pub(crate) fn settle_unsaid(inputs: &mut [FrfInput], reading: &FrfReading, told: &mut Told) {
+    let [first, rest @ ..] = told.said.as_slice() else {
+        return tell_unsaid(reading.unsaid, "", told);
+    };
+    let common = rest.iter().all(|q| q == first).then_some(*first);
+    let Some(common) = common.filter(|_| reading.unsaid_like_the_rest) else {
+        return tell_unsaid(reading.unsaid, "", told);
+    };
+    for unsaid in &told.unsaid {
+        let theirs = |i: &&mut FrfInput| i.set == unsaid.file && unsaid.names.contains(&i.name);
+        for input in inputs.iter_mut().filter(theirs) {
+            // Back to what the file has, and again.
+            let order = order(Some(common)) - order(Some(reading.unsaid));
+            for (f, v) in input.frequency_hz.iter().zip(&mut input.receptance_m_per_n) {
+                *v /= Complex64::new(0.0, TAU * f).powi(order);
+            }
+        }
+    }
+    tell_unsaid(common, " as those of the other files", told);
+}
+
+fn tell_unsaid(taken_as: Quantity, why: &str, told: &mut Told) {
+    for unsaid in &told.unsaid {
+        told.warnings.push(format!(
+            "{}: the file does not say what its {} FRFs are; taken as {}{why} (another: --quantity)",
+            unsaid.file,
+            unsaid.names.len(),
+            units::frf_unit(taken_as)
+        ));
+    }
 }
 
 /// FRFs of one file: as they stand there, or from the hits of a raw record (none where no hit is good).
@@ -43,12 +90,15 @@ pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result
     told.warnings
         .extend(file.warnings.iter().map(|w| format!("{set}: {w}")));
     if !file.contents.frfs.is_empty() {
-        let unsaid = file.contents.frfs.iter().filter(|r| r.quantity.is_none()).count();
-        if unsaid > 0 {
-            told.warnings.push(format!(
-                "{set}: the file does not say what its {unsaid} FRFs are; taken as {} (another: --quantity)",
-                units::frf_unit(reading.unsaid)
-            ));
+        let frfs = &file.contents.frfs;
+        told.said.extend(frfs.iter().filter_map(|r| r.quantity));
+        let of_none = frfs.iter().filter(|r| r.quantity.is_none());
+        let names: Vec<String> = of_none.map(|r| r.name.clone()).collect();
+        if !names.is_empty() {
+            told.unsaid.push(Unsaid {
+                file: set.clone(),
+                names,
+            });
         }
         return Ok(file
             .contents
@@ -143,14 +193,22 @@ fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
     }
 }
 
+/// Derivatives with respect to time that make the quantity of a displacement.
+fn order(quantity: Option<Quantity>) -> i32 {
+    match quantity {
+        None | Some(Quantity::Receptance) => 0,
+        Some(Quantity::Mobility) => 1,
+        Some(Quantity::Accelerance) => 2,
+    }
+}
+
 /// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes
 /// out as not finite and the analysis leaves it out anyway.
 fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quantity>) -> Vec<Complex64> {
-    let order = match quantity {
-        None | Some(Quantity::Receptance) => return value.to_vec(),
-        Some(Quantity::Mobility) => 1,
-        Some(Quantity::Accelerance) => 2,
-    };
+    let order = order(quantity);
+    if order == 0 {
+        return value.to_vec();
+    }
     let lines = frequency_hz.iter().zip(value);
     lines
         .map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order))
@@ -282,6 +340,58 @@ fn from_taps(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// One channel of an analyser has no unit of motion (an amplifier that was not set up): it is what the others are, not m/N.
+    #[test]
+    fn a_file_that_does_not_say_is_what_the_others_are() {
+        let file = |names: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            let rows: String = (1..40)
+                .map(|k| format!("{k},{}.5,{}\n", k % 7, -(k % 5)))
+                .collect();
+            std::fs::write(file.path(), format!("{names}\n{rows}")).unwrap();
+            file
+        };
+        let says = file("frequency_hz,Real [(m/s²)/N],Imag [(m/s²)/N]");
+        let silent = file("frequency_hz,Real [V/N],Imag [V/N]");
+        let read_both = |reading: FrfReading| {
+            let mut told = Told::default();
+            let mut inputs = read(says.path(), &reading, &mut told).unwrap();
+            inputs.extend(read(silent.path(), &reading, &mut told).unwrap());
+            settle_unsaid(&mut inputs, &reading, &mut told);
+            (inputs, told.warnings)
+        };
+        let (inputs, warnings) = read_both(FrfReading {
+            unsaid_like_the_rest: true,
+            ..FrfReading::default()
+        });
+        for (a, b) in inputs[0]
+            .receptance_m_per_n
+            .iter()
+            .zip(&inputs[1].receptance_m_per_n)
+        {
+            assert!((a - b).norm() <= 1e-12 * a.norm());
+        }
+        assert!(
+            warnings
+                .iter()
+                .any(|w| w.contains("taken as (m/s²)/N as those of the other files")),
+            "{warnings:?}"
+        );
+        // What was said on the command line counts.
+        let (inputs, warnings) = read_both(FrfReading {
+            unsaid: Quantity::Mobility,
+            ..FrfReading::default()
+        });
+        let (a, b) = (inputs[0].receptance_m_per_n[9], inputs[1].receptance_m_per_n[9]);
+        assert!((a.norm() / b.norm() - 1.0 / (TAU * 10.0)).abs() < 1e-9);
+        assert!(
+            warnings
+                .iter()
+                .any(|w| w.contains("taken as (m/s)/N (another: --quantity)")),
+            "{warnings:?}"
+        );
+    }
 
     /// A record of one hit, or of none, with these names.
     fn record(names: &str, hit_n: f64) -> tempfile::NamedTempFile {

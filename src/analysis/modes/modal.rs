@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 pub use crate::analysis::modes::frf_inputs::FrfReading;
-use crate::analysis::modes::frf_inputs::{Told, read};
+use crate::analysis::modes::frf_inputs::{Told, read, settle_unsaid};
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
 use crate::analysis::workbench::Workbench;
@@ -104,6 +104,7 @@ impl ModalAnalysis {
             }
             inputs.extend(of_file);
         }
+        settle_unsaid(&mut inputs, &reading, &mut told);
         let refused = told.refused.into_iter().next();
         if let (true, Some(error)) = (inputs.is_empty(), refused) {
             return Err(error);

@@ -31,14 +31,9 @@ pub struct ModalArgs {
     /// The files are one set: FRFs of the same structure, exported one by one.
     #[arg(long)]
     together: bool,
-    /// What the FRFs are of files that do not say.
-    #[arg(
-        long,
-        value_enum,
-        default_value = "receptance",
-        conflicts_with = "output_only"
-    )]
-    quantity: Quantity,
+    /// What the FRFs are of files that do not say (left out: what the other files say, else receptance).
+    #[arg(long, value_enum, conflicts_with = "output_only")]
+    quantity: Option<Quantity>,
     /// Print the modes of every single FRF, however many there are.
     #[arg(long)]
     each: bool,
@@ -208,7 +203,8 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
         }
         files => {
             let reading = FrfReading {
-                unsaid: args.quantity,
+                unsaid: args.quantity.unwrap_or_default(),
+                unsaid_like_the_rest: args.quantity.is_none(),
                 added_decay_per_s: args.window_tau.map_or(0.0, |tau| 1.0 / tau),
                 taps,
                 rate_hz: args.rate,

@@ -10,6 +10,8 @@ use crate::report::number::with_error;
 
 /// Poles that are not taken, shown to a person; all are in the JSON.
 const MOST_REJECTED: usize = 6;
+/// Lines of rotating parts, likewise, the strongest.
+const MOST_LINES: usize = 12;
 
 pub fn document(sets: &[OperationalSet]) -> Value {
     let of_set = |set: &OperationalSet| {
@@ -70,11 +72,22 @@ pub fn text(sets: &[OperationalSet]) -> String {
                 if mode.doubts.is_empty() { "" } else { "  doubtful" },
             );
         }
-        for line in &found.harmonics {
+        let mut strength: Vec<f64> = found.harmonics.iter().map(|line| line.over_noise).collect();
+        strength.sort_by(|a, b| b.total_cmp(a));
+        let least = strength.get(MOST_LINES - 1).copied().unwrap_or(0.0);
+        let shown = found.harmonics.iter().filter(|line| line.over_noise >= least);
+        for line in shown.take(MOST_LINES) {
             let _ = writeln!(
                 out,
                 "    no mode: {}, a rotating part or hum, taken out",
                 line.describe()
+            );
+        }
+        if found.harmonics.len() > MOST_LINES {
+            let _ = writeln!(
+                out,
+                "    … and {} weaker lines more: see --json",
+                found.harmonics.len() - MOST_LINES
             );
         }
         for rejected in found.rejected.iter().take(MOST_REJECTED) {

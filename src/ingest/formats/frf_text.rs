@@ -15,7 +15,11 @@ use crate::ingest::units;
 /// What a column of an FRF table holds; the text names the FRF (empty where there is one only).
 #[derive(Debug, Clone, PartialEq)]
 enum Column {
-    Frequency { factor: f64 },
+    /// A running number in front of all others.
+    Index,
+    Frequency {
+        factor: f64,
+    },
     Re(String),
     Im(String),
     Magnitude(String, Scale),
@@ -166,6 +170,10 @@ fn column_without_unit(name: &str) -> Column {
         "phase_rad" => Column::Phase(of, Angle::Radians),
         "phase" | "phase angle" => Column::Phase(of, Angle::Unsaid),
         "coherence" | "coh" | "gamma2" => Column::Coherence(of),
+        // A nameless first column, `Unnamed: 0`: what pandas writes.
+        "" | "unnamed: 0" | "index" | "line" | "no" | "no." | "nr" | "nr." | "n" | "#" | "row" => {
+            Column::Index
+        }
         "f" | "freq" | "frq" | "freq." | "frequency" | "frequency_hz" | "freq_hz" | "f_hz" | "hz"
         | "frequenz" => Column::Frequency {
             factor: units::frequency_factor(inside).unwrap_or(1.0),
@@ -242,7 +250,10 @@ pub(crate) fn join_signalcalc(header: &mut Header) {
 /// Header lines of a table without column names, or with none for the first column, that say what its columns are: the
 /// text exports of Simcenter Testlab (`X axis unit`, `Value type`, `DOF id`, …; frequency, real and imaginary part
 /// below) and those whose first column is the `AxisUnit`. Such a header is changed to what other tables have.
-pub(crate) fn join_said_above(header: &mut Header) {
+///
+/// # Errors
+/// Where they say that the columns are spectra without phases.
+pub(crate) fn join_said_above(header: &mut Header) -> Result<(), InputError> {
     let mut said: HashMap<String, String> = HashMap::new();
     let last = header.names.join("\t");
     for line in header.lines.iter().chain([&last]) {
@@ -271,11 +282,19 @@ pub(crate) fn join_said_above(header: &mut Header) {
         }
     } else if is("axisunit", "hz")
         && header.names.len() > 1
-        && header.names[1..].iter().all(|n| column(n) != Column::Unknown)
         && !header.names[0].chars().any(char::is_alphanumeric)
     {
+        if header.names[1..].iter().any(|n| column(n) == Column::Unknown) {
+            let of = get("functiontype").map_or(String::new(), |of| format!(" ({of})"));
+            return Err(InputError::new(format!(
+                "spectra over Hz{of} without phases: no frequency responses"
+            ))
+            .line(header.data_line)
+            .remedy("export the FRFs (H1) with real and imaginary part, or the time signals"));
+        }
         header.names[0] = "frequency_hz".into();
     }
+    Ok(())
 }
 
 /// `Point:10:-Z` of Testlab: component, node, direction.
@@ -325,10 +344,17 @@ fn dofs_of_header(header: &Header) -> (Option<Dof>, Option<Dof>) {
 /// True where the column names are those of FRFs.
 pub(crate) fn is_frf_table(header: &Header) -> bool {
     let columns: Vec<Column> = header.names.iter().map(|n| column(n)).collect();
-    matches!(columns.first(), Some(Column::Frequency { .. }))
-        && columns
-            .iter()
-            .any(|c| matches!(c, Column::Re(_) | Column::Magnitude(..)))
+    matches!(
+        columns.get(frequency_at(&columns)),
+        Some(Column::Frequency { .. })
+    ) && columns
+        .iter()
+        .any(|c| matches!(c, Column::Re(_) | Column::Magnitude(..)))
+}
+
+/// The frequency is the first column, or the second behind a running number.
+fn frequency_at(columns: &[Column]) -> usize {
+    usize::from(columns.first() == Some(&Column::Index))
 }
 
 /// True where three columns of numbers stand alone, or under a heading that speaks of frequency.
@@ -381,16 +407,17 @@ pub(crate) fn read_table(
             other => in_unit(other, below(at)),
         })
         .collect();
-    let Some(Column::Frequency { factor }) = columns.first().cloned() else {
+    let frequency_at = frequency_at(&columns);
+    let Some(Column::Frequency { factor }) = columns.get(frequency_at).cloned() else {
         return Err(InputError::new("the first column is not the frequency").line(names_line));
     };
     let mut parts: Vec<Parts> = Vec::new();
     let mut index: HashMap<&str, usize> = HashMap::new();
-    for (at, column) in columns.iter().enumerate().skip(1) {
+    for (at, column) in columns.iter().enumerate().skip(frequency_at + 1) {
         let name = match column {
             Column::Re(n) | Column::Im(n) | Column::Magnitude(n, _) => n,
             Column::Phase(n, _) | Column::Coherence(n) => n,
-            Column::Frequency { .. } | Column::Unknown => {
+            Column::Index | Column::Frequency { .. } | Column::Unknown => {
                 return Err(
                     InputError::new(format!("column {:?} is not part of an FRF", header.names[at]))
                         .line(names_line)
@@ -427,7 +454,7 @@ pub(crate) fn read_table(
         }
     }
     let table = header.read(bytes, None, notes)?;
-    let frequency_hz: Vec<f64> = table.columns[0].iter().map(|f| f * factor).collect();
+    let frequency_hz: Vec<f64> = table.columns[frequency_at].iter().map(|f| f * factor).collect();
     let mut frfs = Vec::with_capacity(parts.len());
     for part in parts {
         let pair = |a: usize, b: usize| table.columns[a].iter().zip(&table.columns[b]);

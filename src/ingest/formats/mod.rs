@@ -8,6 +8,7 @@ pub(crate) mod lvm;
 pub(crate) mod mat;
 pub(crate) mod numpy;
 pub(crate) mod packed;
+pub(crate) mod pulse;
 pub(crate) mod tdms;
 pub(crate) mod uff;
 pub(crate) mod waveform;

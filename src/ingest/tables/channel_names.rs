@@ -40,6 +40,8 @@ const BEFORE_TIME: [&str; 8] = [
     "measurement",
     "abs",
 ];
+/// Behind a word for time these make something else of it: a window, a setting.
+const NOT_THE_TIME: [&str; 4] = ["weighting", "constant", "window", "zone"];
 const FORCE_WORDS: [&str; 10] = [
     "force", "forces", "kraft", "fuerza", "effort", "forza", "força", "kracht", "síla", "f",
 ];
@@ -184,6 +186,9 @@ pub(crate) fn is_time(name: &str) -> bool {
     }
     let words = words(split_unit(name).0);
     let is_word = |at: usize| words.get(at).is_some_and(|w| TIME_WORDS.contains(&w.as_str()));
+    if words.get(1).is_some_and(|w| NOT_THE_TIME.contains(&w.as_str())) {
+        return false;
+    }
     is_word(0) || words.first().is_some_and(|w| BEFORE_TIME.contains(&w.as_str())) && is_word(1)
 }
 

@@ -260,6 +260,7 @@ impl Header {
             .collect();
         let (mut rows, mut from, mut line) = (0, 0, first_line);
         let mut bad_row = None;
+        let mut ends_in_a_row = true;
         for (k, (part, room)) in parts.iter().zip(&room).enumerate() {
             if rows < from {
                 columns
@@ -268,9 +269,16 @@ impl Header {
             }
             rows += part.rows;
             from += room;
-            if let Some((text, rest_is_blank)) = &part.bad {
-                if is_last && k + 1 == parts.len() && *rest_is_blank && rows > 0 {
+            if let Some((text, rest)) = &part.bad {
+                let at_the_end = is_last && k + 1 == parts.len() && rows > 0;
+                if at_the_end && *rest == Rest::Blank {
                     notes.file("the last row is incomplete and left out");
+                } else if let (true, Rest::Footer(count)) = (at_the_end, rest) {
+                    notes.file(format!(
+                        "{count} lines below the last row, from {:?} on, are no rows and left out",
+                        text.trim_end().chars().take(20).collect::<String>().trim_end()
+                    ));
+                    ends_in_a_row = false;
                 } else {
                     bad_row = Some(self.bad_row(text, line + part.lines));
                 }
@@ -282,7 +290,7 @@ impl Header {
         if let Some(error) = bad_row {
             return Err(error);
         }
-        if is_last && rows > 3 && ends_within_a_number(data, self.decimal) {
+        if is_last && ends_in_a_row && rows > 3 && ends_within_a_number(data, self.decimal) {
             columns.iter_mut().for_each(|c| c.truncate(c.len() - 1));
             notes.file(
                 "the file ends without a line end, its last number has fewer digits than those above: cut off, the last row \
@@ -314,9 +322,8 @@ impl Header {
                 Row::Blank(next) => at = next,
                 Row::Bad => {
                     let length = memchr::memchr(b'\n', &data[at..]);
-                    let rest = length.map_or(&[][..], |l| &data[at + l..]);
                     let text = decode(&data[at..length.map_or(data.len(), |l| at + l)]);
-                    bad = Some((text, rest.trim_ascii().is_empty()));
+                    bad = Some((text, Rest::of(&data[at..])));
                     break;
                 }
             }
@@ -537,8 +544,41 @@ struct Part {
     rows: usize,
     /// Lines read before the end or the bad row.
     lines: usize,
-    /// A row that is none, and whether nothing follows it.
-    bad: Option<(String, bool)>,
+    /// A row that is none, and what follows it.
+    bad: Option<(String, Rest)>,
+}
+
+/// What stands from a row that is none on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Rest {
+    /// The row is the last.
+    Blank,
+    /// So many lines of words, as programs put them below their tables.
+    Footer(usize),
+    /// Rows of numbers, or more than a footer.
+    Rows,
+}
+
+impl Rest {
+    /// Lines that a footer has at most.
+    const FOOTER_LINES: usize = 60;
+
+    fn of(text: &[u8]) -> Rest {
+        let mut lines = Lines::new(text).filter(|line| !line.trim_ascii().is_empty());
+        let first = lines.next().unwrap_or_default().trim_ascii();
+        let more: Vec<&[u8]> = lines.take(Self::FOOTER_LINES).collect();
+        let is_in_words = first
+            .first()
+            .is_some_and(|b| b.is_ascii_alphabetic() || b"#%*[\"".contains(b))
+            && !is_row(first);
+        if is_in_words && more.len() < Self::FOOTER_LINES && !more.iter().any(|line| is_row(line)) {
+            Rest::Footer(1 + more.len())
+        } else if more.is_empty() {
+            Rest::Blank
+        } else {
+            Rest::Rows
+        }
+    }
 }
 
 /// Bytes worth a thread of their own.

@@ -8,8 +8,66 @@ const MOST: f64 = 0.95;
 /// … in so little of the record is one event.
 const BRIEF: f64 = 0.25;
 
+/// A level that changes so many times between stretches of a record is told.
+const CHANGES: f64 = 5.0;
+
+/// A record of which one part is much louder than the rest.
+#[derive(Debug, PartialEq)]
+pub(super) struct LevelChange {
+    /// How many times as large the motion is there.
+    pub times: f64,
+    /// From where to where, as shares of the record.
+    pub loud: [f64; 2],
+}
+
+/// Says where the motion is much larger than in the rest, where that is one stretch of some length.
+pub(super) fn level_changes(channels: &[Vec<f64>]) -> Option<LevelChange> {
+    let motion = motion(channels)?;
+    let middle = |mut values: Vec<f64>| -> Option<f64> {
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let mut sorted = motion.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    // Between the levels, of powers.
+    let between = (sorted[STRETCHES / 10] * sorted[STRETCHES - 1 - STRETCHES / 10]).sqrt();
+    let is_loud = |k: &usize| motion[*k] > between;
+    let from = (0..STRETCHES).find(is_loud)?;
+    let to = (0..STRETCHES).rfind(is_loud)? + 1;
+    let (loud, quiet): (Vec<usize>, Vec<usize>) = (0..STRETCHES).partition(is_loud);
+    let power = |of: Vec<usize>| middle(of.into_iter().map(|k| motion[k]).collect());
+    // With holes in it, it is no stretch.
+    let whole = 10 * loud.len() >= 9 * (to - from);
+    let times = (power(loud)? / power(quiet)?).sqrt();
+    let share = |stretch: usize| stretch as f64 / STRETCHES as f64;
+    (whole && times.is_finite() && times > CHANGES).then(|| LevelChange {
+        times,
+        loud: [share(from), share(to)],
+    })
+}
+
 /// From where to where, as shares of the record, nearly all motion lies, if that is one brief stretch of it.
 pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
+    let motion = motion(channels)?;
+    let whole: f64 = motion.iter().sum();
+    let brief = (BRIEF * STRETCHES as f64) as usize;
+    let (from, held) = motion
+        .windows(brief)
+        .map(|window| window.iter().sum::<f64>())
+        .enumerate()
+        .max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if !(held > MOST * whole) {
+        return None;
+    }
+    let loud: Vec<usize> = (from..from + brief)
+        .filter(|&k| motion[k] > (1.0 - MOST) * whole / brief as f64)
+        .collect();
+    let share = |stretch: usize| stretch as f64 / STRETCHES as f64;
+    Some([share(*loud.first()?), share(loud.last()? + 1)])
+}
+
+/// Power of the motion stretch by stretch, each channel with the weight one.
+fn motion(channels: &[Vec<f64>]) -> Option<[f64; STRETCHES]> {
     let lines = channels.first()?.len();
     let length = lines / STRETCHES;
     if length < 2 {
@@ -30,21 +88,7 @@ pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
             }
         }
     }
-    let whole: f64 = motion.iter().sum();
-    let brief = (BRIEF * STRETCHES as f64) as usize;
-    let (from, held) = motion
-        .windows(brief)
-        .map(|window| window.iter().sum::<f64>())
-        .enumerate()
-        .max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if !(held > MOST * whole) {
-        return None;
-    }
-    let loud: Vec<usize> = (from..from + brief)
-        .filter(|&k| motion[k] > (1.0 - MOST) * whole / brief as f64)
-        .collect();
-    let share = |stretch: usize| stretch as f64 / STRETCHES as f64;
-    Some([share(*loud.first()?), share(loud.last()? + 1)])
+    Some(motion)
 }
 
 fn squares_about_mean(values: &[f64]) -> f64 {
@@ -78,6 +122,20 @@ mod tests {
         let [from, to] = one_event(&released).unwrap();
         assert!((8.0 * from - 1.0).abs() < 0.21, "{from}");
         assert!((1.6..3.0).contains(&(8.0 * to)), "{to}");
+    }
+
+    #[test]
+    fn a_cut_within_air_is_told_and_steady_motion_is_not() {
+        let level = |t: f64| if (1.0..4.0).contains(&t) { 1.0 } else { 0.05 };
+        let cut = record(|t| level(t) * (TAU * 37.0 * t).sin());
+        let found = level_changes(&cut).unwrap();
+        assert!((found.times / 20.0 - 1.0).abs() < 0.2, "{found:?}");
+        assert!((8.0 * found.loud[0] - 1.0).abs() < 0.21 && (8.0 * found.loud[1] - 4.0).abs() < 0.21);
+        assert_eq!(level_changes(&record(|t| (TAU * 37.0 * t).sin())), None);
+        let hits = record(|t| (0..4).map(|k| decay(t - 0.3 - 2.0 * f64::from(k))).sum());
+        assert_eq!(level_changes(&hits), None);
+        assert_eq!(level_changes(&record(|_| 1.0)), None);
+        assert_eq!(level_changes(&[]), None);
     }
 
     #[test]

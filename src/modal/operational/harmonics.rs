@@ -32,6 +32,16 @@ const ROUNDS: usize = 3;
 const CONSTANT: f64 = 1.5;
 /// Standard deviations below 2.
 const SURE: f64 = 3.0;
+/// Independent values of the envelope in a stretch that is judged by itself.
+const STRETCH: f64 = 12.0;
+/// A spindle under load is slower than it was told to be by up to this part.
+const SLIP: f64 = 0.01;
+/// Damping ratio below which what is near a multiple of the spindle's speed is doubtful …
+const NARROW: f64 = 3e-3;
+/// … and what is anywhere, where other lines tell that something turns: welded steel has about this.
+const VERY_NARROW: f64 = 1e-3;
+/// A speed is believed where chance would bring as many multiples of any in less than this part of all records.
+const BY_LUCK: f64 = 1e-2;
 /// A multiple of the spindle's frequency is met to within this part, or two lines of the periodogram.
 const SAME: f64 = 1e-3;
 /// Lines that must be multiples of one frequency to call it the speed.
@@ -247,6 +257,15 @@ fn subtract(samples: &mut [f64], cycles: f64) {
     }
 }
 
+/// How unlikely it is that chance brings `count` lines where it brings `mean` on average: −ln P of a Poisson count that is far above its
+/// mean (Chernoff's bound).
+fn surprise(count: f64, mean: f64) -> f64 {
+    if count <= mean {
+        return 0.0;
+    }
+    count * (count / mean.max(f64::MIN_POSITIVE)).ln() - count + mean
+}
+
 /// Names the lines as multiples of the speed that is given, else of the highest frequency that most are multiples of.
 fn name(lines: &mut [Harmonic], speed_hz: Option<f64>, step_hz: f64) {
     let multiple = |f: f64, of: f64| {
@@ -256,7 +275,7 @@ fn name(lines: &mut [Harmonic], speed_hz: Option<f64>, step_hz: f64) {
     };
     let of_hz = speed_hz.or_else(|| {
         let frequencies: Vec<f64> = lines.iter().map(|l| l.frequency_hz).collect();
-        let mut best: Option<(usize, f64)> = None;
+        let mut best: Option<(f64, f64)> = None;
         for f in &frequencies {
             for part in 1..=6 {
                 let of = f / f64::from(part);
@@ -268,8 +287,12 @@ fn name(lines: &mut [Harmonic], speed_hz: Option<f64>, step_hz: f64) {
                     .iter()
                     .filter(|f| (**f - (**f / of).round() * of).abs() < 2.0 * step_hz && **f > 0.9 * of)
                     .count();
-                if fit >= ENOUGH && best.is_none_or(|(n, b)| fit > n || fit == n && of > b) {
-                    best = Some((fit, of));
+                // Among many lines some are multiples of anything; one of them was chosen to be.
+                let chance = (4.0 * step_hz / of).min(1.0) * (frequencies.len() - 1) as f64;
+                let told = surprise((fit.max(1) - 1) as f64, chance);
+                let believed = told > ((6 * frequencies.len()) as f64 / BY_LUCK).ln();
+                if fit >= ENOUGH && believed && best.is_none_or(|(t, b)| told > t || told == t && of > b) {
+                    best = Some((told, of));
                 }
             }
         }
@@ -312,11 +335,42 @@ impl Spectra {
         // Powers of random lines are exponential, with twice the mean square of their expectation.
         let independent = 2.0 * sum * sum / squares;
         envelope_in_place(&mut inside);
-        let n = inside.len() as f64;
-        let second = inside.iter().map(|z| z.norm_sqr()).sum::<f64>() / n;
-        let fourth = inside.iter().map(|z| z.norm_sqr().powi(2)).sum::<f64>() / n;
-        (second > 0.0).then(|| (fourth / (second * second), independent))
+        let whole = constancy(&inside, independent, 1)?;
+        // A tool that cuts for a part of the record only: the level of its lines comes and goes, which makes the kurtosis of a
+        // sine that of random motion. Within a stretch it does not.
+        let by_stretches = constancy(&inside, independent, (independent / STRETCH) as usize)?;
+        let sureness = |(kurtosis, count): (f64, f64)| (2.0 - kurtosis) * count.sqrt();
+        Some(if sureness(by_stretches) > sureness(whole) {
+            by_stretches
+        } else {
+            whole
+        })
     }
+}
+
+/// Kurtosis of an envelope with so many independent values, stretch by stretch, weighted with the power of each; and how many
+/// independent values that weighs.
+fn constancy(envelope: &[Complex64], independent: f64, stretches: usize) -> Option<(f64, f64)> {
+    let stretches = stretches.max(1);
+    let of_each = independent / stretches as f64;
+    let length = envelope.len().div_ceil(stretches).max(1);
+    let (mut sum, mut weights, mut squares) = (0.0, 0.0, 0.0);
+    for stretch in envelope.chunks(length) {
+        let n = stretch.len() as f64;
+        let second = stretch.iter().map(|z| z.norm_sqr()).sum::<f64>() / n;
+        let fourth = stretch.iter().map(|z| z.norm_sqr().powi(2)).sum::<f64>() / n;
+        if second > 0.0 {
+            let weight = second * n;
+            sum += weight * fourth / (second * second);
+            weights += weight;
+            squares += weight * weight;
+        }
+    }
+    // The mean square of few values scatters, so that the quotient is too small by m/(m + 1) (powers of random motion are
+    // exponential).
+    let unbiased = if stretches == 1 { 1.0 } else { 1.0 + 1.0 / of_each };
+    let share = weights * weights / (stretches as f64 * squares);
+    (weights > 0.0).then(|| (unbiased * sum / weights, independent * share.min(1.0)))
 }
 
 fn envelope_in_place(lines: &mut Vec<Complex64>) {
@@ -358,6 +412,33 @@ pub(super) fn is_line(mode: &OperationalMode, lines: &[Harmonic], spectra: &Spec
     (kurtosis < CONSTANT && significance > SURE).then(|| {
         format!(
             "its envelope is constant (kurtosis {kurtosis:.2}; random motion 2, a sine 1): a rotating part whose speed wavers"
+        )
+    })
+}
+
+/// Why a mode may be a rotating part whose speed wavers, where nothing proves it.
+pub(super) fn doubt(mode: &OperationalMode, lines: &[Harmonic], spindle_rpm: Option<f64>) -> Option<String> {
+    let speed_hz = spindle_rpm
+        .map(|rpm| rpm / 60.0)
+        .or_else(|| lines.iter().find_map(|line| line.of_hz))
+        .filter(|f| *f > 0.0);
+    let percent = 100.0 * mode.damping_ratio;
+    if let Some(speed_hz) = speed_hz {
+        let multiple = (mode.frequency_hz / speed_hz).round();
+        let near = (mode.frequency_hz - multiple * speed_hz).abs() < SLIP * mode.frequency_hz;
+        // Beyond, all frequencies are near a multiple.
+        let tells = multiple >= 1.0 && multiple * SLIP < 0.15;
+        if near && tells && mode.damping_ratio < NARROW {
+            return Some(format!(
+                "near {multiple} × {speed_hz:.2} Hz and narrow (damping {percent:.2} %): it may be the spindle, whose speed wavers or \
+                 falls in the cut"
+            ));
+        }
+    }
+    (!lines.is_empty() && mode.damping_ratio < VERY_NARROW).then(|| {
+        format!(
+            "narrower than structures are (damping {percent:.3} %) in a record in which something turns: it may be a rotating part \
+             whose speed wavers; a record at another speed tells"
         )
     })
 }
@@ -461,6 +542,80 @@ mod tests {
         let mut few: Vec<Harmonic> = [30.0, 50.0].map(line).to_vec();
         name(&mut few, None, 0.005);
         assert_eq!(few[0].multiple, None);
+        // Of a hundred lines anywhere some are multiples of any speed.
+        let mut random = ChaCha8Rng::seed_from_u64(4);
+        let mut many: Vec<Harmonic> = (0..100)
+            .map(|_| line(3000.0 * rand::Rng::random::<f64>(&mut random)))
+            .collect();
+        name(&mut many, None, 0.2);
+        assert!(many.iter().all(|l| l.multiple.is_none()));
+        // A spindle's twenty among them are still seen.
+        many.extend((1..=20).map(|k| line(100.02 * f64::from(k))));
+        name(&mut many, None, 0.2);
+        let named = many.iter().filter(|l| l.multiple.is_some()).count();
+        assert!(
+            named >= 20
+                && many
+                    .last()
+                    .is_some_and(|l| l.of_hz.is_some_and(|f| (f - 100.02).abs() < 0.05))
+        );
+    }
+
+    #[test]
+    fn a_narrow_mode_near_a_multiple_of_the_speed_is_doubtful() {
+        let mode = |frequency_hz, damping_ratio| OperationalMode {
+            frequency_hz,
+            damping_ratio,
+            frequency_std_hz: 0.1,
+            damping_std: 1e-4,
+            orders: 10,
+            complexity: None,
+            shape: vec![Complex64::ONE],
+            doubts: Vec::new(),
+        };
+        let found = doubt(&mode(699.5, 6e-4), &[], Some(7000.0)).unwrap();
+        assert!(found.starts_with("near 6 × 116.67 Hz"), "{found}");
+        // Wide as a structure's, or between multiples.
+        assert_eq!(doubt(&mode(699.5, 0.01), &[], Some(7000.0)), None);
+        assert_eq!(doubt(&mode(640.0, 2e-3), &[], Some(7000.0)), None);
+        let line = Harmonic {
+            frequency_hz: 50.0,
+            over_noise: 100.0,
+            multiple: None,
+            of_hz: None,
+        };
+        assert!(doubt(&mode(640.0, 5e-4), &[line], None).is_some());
+        assert_eq!(doubt(&mode(640.0, 5e-4), &[], None), None);
+    }
+
+    /// A tool that cuts for a third of the record: its wavering line is as constant as ever while it is there; random motion
+    /// that comes and goes is not.
+    #[test]
+    fn a_line_that_comes_and_goes_is_constant_while_it_is_there() {
+        let n = 65_536;
+        let there = |k: usize| if k < n / 3 { 1.0 } else { 0.03 };
+        let mut random = ChaCha8Rng::seed_from_u64(9);
+        let (mut phase, mut offset) = (0.0, 0.0);
+        let line: Vec<f64> = (0..n)
+            .map(|k| {
+                offset += 0.02 * super::super::tests::gauss(&mut random) - 0.002 * offset;
+                phase += TAU * (20.0 + offset) / 100.0;
+                there(k) * phase.sin()
+            })
+            .collect();
+        let gated: Vec<f64> = noise(n, 4)
+            .iter()
+            .enumerate()
+            .map(|(k, x)| there(k) * x)
+            .collect();
+        let spectra = Spectra::new(&[line, gated], 100.0);
+        let (line, count) = spectra.envelope(0, [18.0, 22.0]).unwrap();
+        assert!(
+            line < CONSTANT && (2.0 - line) > SURE * 2.0 / count.sqrt(),
+            "{line} {count}"
+        );
+        let (gated, count) = spectra.envelope(1, [18.0, 22.0]).unwrap();
+        assert!((2.0 - gated) < SURE * 2.0 / count.sqrt(), "{gated} {count}");
     }
 
     #[test]

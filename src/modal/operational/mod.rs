@@ -105,6 +105,7 @@ pub fn operational_modes(
         )
         .into());
     }
+    let changes = event::level_changes(&channels);
     result.harmonics = harmonics::take_out(&mut channels, rate_hz, band_hz, settings.spindle_rpm);
     let scale: Vec<f64> = channels.iter().map(|c| rms(c)).collect();
     if let Some(still) = scale.iter().position(|s| !(*s > 0.0)) {
@@ -150,6 +151,8 @@ pub fn operational_modes(
                 inside.join(", ")
             ));
         }
+        mode.doubts
+            .extend(harmonics::doubt(&mode, &result.harmonics, settings.spindle_rpm));
         for (z, scale) in mode.shape.iter_mut().zip(&scale) {
             *z *= *scale;
         }
@@ -161,6 +164,16 @@ pub fn operational_modes(
         .rejected
         .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     result.warnings = warnings(&result);
+    if let Some(changes) = changes {
+        let seconds = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
+        result.warnings.push(format!(
+            "the motion is {:.0} times as large between {:.1} and {:.1} s as in the rest of the record (a cut and the air around it?): \
+             the modes are those of the loud stretch, the standard deviations suffer; a record of one kind is better",
+            changes.times,
+            changes.loud[0] * seconds,
+            changes.loud[1] * seconds
+        ));
+    }
     Ok(result)
 }
 

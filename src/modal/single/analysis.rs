@@ -56,6 +56,10 @@ const MORE_THAN_NOISE: f64 = 2.0;
 const MOST_TAKEN_AWAY: f64 = 0.5;
 /// One more pole that is damped this many times as much as its neighbour is no mode there but a shape of the residual.
 const MOST_DAMPED: f64 = 5.0;
+/// The sense of turning of a peak counts by its height over what is around it, up to this.
+const MOST_WEIGHT: f64 = 50.0;
+/// What turns the wrong way weighs so many times the rest before a whole FRF is taken to be conjugated, which is rare.
+const CONJUGATED: f64 = 2.0;
 /// A peak that rises by less than this part of its height is a ripple.
 const RIPPLE: f64 = 0.5;
 /// Modes nearer to each other than this many sums of their half-widths overlap.
@@ -134,8 +138,14 @@ fn analyse(
             circle_fit::turns_backwards(&curve, lines, noise_std[p.index])
         })
         .collect();
-    let count = |sense| backwards.iter().filter(|b| **b == Some(sense)).count();
-    result.conjugated = count(true) > count(false);
+    // The resonances tell, not the ripples between them, however many those are.
+    let weight = |sense| -> f64 {
+        let of_sense = peaks.iter().zip(&backwards).filter(|(_, b)| **b == Some(sense));
+        of_sense
+            .map(|(p, _)| (1.0 - p.rise).recip().min(MOST_WEIGHT))
+            .sum()
+    };
+    result.conjugated = weight(true) > CONJUGATED * weight(false);
     if result.conjugated {
         curve.conjugate();
         result.warnings.push(

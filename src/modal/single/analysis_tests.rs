@@ -64,6 +64,30 @@ fn a_mode_of_negative_damping_is_named_and_left_out() {
     );
 }
 
+/// Whatever the number of ripples that turn the other way (leakage, wandering of the structure): the resonances tell how phases are
+/// counted.
+#[test]
+fn ripples_do_not_outvote_the_resonances() {
+    let case = |count: i32| {
+        let ripples = (0..count).map(|k| SyntheticMode::new(48.0 + 3.3 * f64::from(k), -0.004, 2e-4));
+        let modes: Vec<SyntheticMode> = MODES.into_iter().chain(ripples).collect();
+        Synthetic::new(3.0, 90.0, 0.1, &modes).with_noise(0.0, 0.005, 3)
+    };
+    let found = analyse(case(12));
+    let ripples = found.warnings.iter().filter(|w| w.contains("wrong way round"));
+    assert!(ripples.count() > 3 && !found.conjugated, "{:?}", found.warnings);
+    let at = |f: f64| {
+        found
+            .modes
+            .iter()
+            .any(|m| (m.best().frequency_hz / f - 1.0).abs() < 2e-3)
+    };
+    assert!(MODES.iter().all(|m| at(m.frequency_hz)), "{:?}", found.modes);
+    let (f, mut h) = case(3).frf();
+    h.iter_mut().for_each(|h| *h = h.conj());
+    assert!(analyse_frf(&f, &h, &Settings::default()).unwrap().conjugated);
+}
+
 #[test]
 fn nothing_is_found_in_noise_or_in_a_line() {
     for seed in 0..20 {

@@ -137,7 +137,10 @@ fn tables(
         }
         let axis = &variable.re[..rows];
         let no_phase = |im: &Vec<f64>| im[..rows].iter().all(|v| *v == 0.0);
-        if !variable.im.as_ref().is_none_or(no_phase) || axis[0] < 0.0 || !rises_evenly(axis) {
+        // Times before the trigger are negative, frequencies never.
+        let may_be_time = variable.im.is_none() && matches!(kind(variable), Kind::Unknown);
+        if !variable.im.as_ref().is_none_or(no_phase) || axis[0] < 0.0 && !may_be_time || !rises_evenly(axis)
+        {
             continue;
         }
         budget.take(48 * variable.re.len(), &format!("variable {}", variable.name))?;

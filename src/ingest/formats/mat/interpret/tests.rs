@@ -136,6 +136,14 @@ fn arrays_with_their_axis_in_the_first_column() {
 }
 
 #[test]
+fn times_before_the_trigger_are_negative() {
+    let rows = [[-0.002, -0.001, 0.0, 0.001, 0.002], [0.0, 0.0, 7.0, 3.0, 1.0]].concat();
+    let (found, _) = found(vec![real("shock", &[5, 2], rows)]);
+    assert_eq!(found.times[0].start_s, -0.002);
+    assert_eq!(found.times[0].channels[0].samples, [0.0, 0.0, 7.0, 3.0, 1.0]);
+}
+
+#[test]
 fn axes_of_start_and_step_of_their_own_or_in_radians() {
     let complex = |name: &str, n: usize| {
         let mut v = real(name, &[n, 1], count(n));

@@ -37,6 +37,8 @@ PICTURES = {
     "structure": [(["missing-map"], ""), (["missing-frf-1"], "-frf")],
     "cutting": [(["waveform-1", "misfit-drilling"], "")],
 }
+# Vibration beside the rotation is not in the mean of the turns.
+BETTER = {"chatter": [(["waveform-orders"], "")]}
 
 
 def lobestone(program, *arguments):
@@ -104,7 +106,7 @@ def main():
             found = lobestone(options.program, "diagnose", str(folder))
             known[identity] = nearest(found, identity)
             lobestone(options.program, "report", str(folder))
-            for names, suffix in PICTURES[effect["domain"]]:
+            for names, suffix in BETTER.get(identity, PICTURES[effect["domain"]]):
                 made = next(p for p in (folder / "report" / f"{n}.png" for n in names) if p.exists())
                 shutil.copyfile(made, OUT / f"{identity}{suffix}.png")
         known = {i: known[i] for i in sorted(known) if i in ids}

@@ -5,7 +5,9 @@ use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{Rival, SetupCheck};
-use crate::discrepancy::{Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, diagnose};
+use crate::discrepancy::{
+    Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, diagnose, diagnose_from,
+};
 use crate::effects::{Cutting, Structure};
 use crate::identify::model_history::recorded_effects;
 use crate::identify::{Case, Modelled, Options};
@@ -78,11 +80,23 @@ impl<D: CampaignSide> Findings<D> {
         let mut diagnosis = diagnose(&study, &case.model)?;
         let setup = D::setup(&case, &study, &diagnosis)?;
         heed_setup(&mut diagnosis, &setup);
-        let now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
-        let lead = match is_unnamed(&diagnosis, &setup) {
+        let mut now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
+        let mut lead = match is_unnamed(&diagnosis, &setup) {
             true => D::lead(&case, campaign, &study, &diagnosis, &now)?,
             false => None,
         };
+        // What the data draw may have a name after all.
+        if let Some(found) = &lead
+            && let Some(named) = D::named(&case, &study, found)?
+        {
+            let again = diagnose_from(&study, &case.model, vec![named])?;
+            if again.verdict == DiagnosisVerdict::Effect {
+                diagnosis = again;
+                heed_setup(&mut diagnosis, &setup);
+                now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
+                lead = None;
+            }
+        }
         let leading = leading_candidate(&diagnosis)
             .map(|number| {
                 let candidate = &diagnosis.candidates[number];

@@ -7,7 +7,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::setup::SetupCheck;
 use crate::discrepancy::{Diagnosis, NextMeasurement};
-use crate::effects::{Known, Registry};
+use crate::effects::{Instance, Known, Registry};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, Case, Model, Modelled, Options, Study};
 
@@ -70,6 +70,19 @@ pub trait CampaignSide: Modelled {
         diagnosis: &Diagnosis<Self>,
         now: &Self::View,
     ) -> Result<Option<Self::Lead>>;
+
+    /// An effect of the library that a diagnosis missed, by what `lead` has found, and a point from which it is seen (the model's
+    /// parameters and its own, solver's scale).
+    ///
+    /// # Errors
+    /// A model that does not respond.
+    fn named(
+        _case: &Case<Self>,
+        _study: &Self::Study,
+        _lead: &Self::Lead,
+    ) -> Result<Option<(Instance<Self>, Vec<f64>)>> {
+        Ok(None)
+    }
 
     /// The measurement that would tell most.
     ///

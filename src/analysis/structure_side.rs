@@ -11,11 +11,12 @@ use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::joint_trends::{JointTrends, joint_trends};
+use crate::discrepancy::localise::named::named;
 use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::outlook::next_measurement;
 use crate::discrepancy::setup::{SetupCheck, examine};
 use crate::discrepancy::{Diagnosis, Explained, FrfComparison, NextMeasurement};
-use crate::effects::{Known, Registry, Structure};
+use crate::effects::{Instance, Known, Registry, Structure};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, Options, StructureCase, StructureModel, StructureStudy};
 
@@ -103,6 +104,17 @@ impl CampaignSide for Structure {
             joints: joint_trends(study, &case.model, &diagnosis.baseline.theta, &campaign.postures)?,
         };
         Ok(Some(found))
+    }
+
+    fn named(
+        case: &StructureCase,
+        study: &StructureStudy,
+        lead: &StructureLead,
+    ) -> Result<Option<(Instance<Structure>, Vec<f64>)>> {
+        match &lead.place {
+            Some(found) => named(study, &case.model, found),
+            None => Ok(None),
+        }
     }
 
     fn next(

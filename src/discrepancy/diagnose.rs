@@ -108,7 +108,20 @@ fn price_of_a_parameter(independent_values: f64) -> f64 {
 
 /// Diagnoses `model` (with the effects it already has).
 pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::Domain>> {
-    Engine::new(study, model)?.run()
+    diagnose_from(study, model, Vec::new())
+}
+
+/// As [`diagnose`]; effects are tried from these points (the model's parameters and their own, solver's scale), too.
+pub fn diagnose_from<S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    beginnings: Vec<(InstanceOf<S>, Vec<f64>)>,
+) -> Result<Diagnosis<S::Domain>> {
+    Engine {
+        beginnings,
+        ..Engine::new(study, model)?
+    }
+    .run()
 }
 
 type TriedOf<S> = Tried<<S as Study>::Domain>;
@@ -155,6 +168,8 @@ struct Engine<'a, S: Study> {
     instances: Vec<InstanceOf<S>>,
     not_tried: Vec<(String, String)>,
     base_count: usize,
+    /// Effects, and a point from which each is tried besides.
+    beginnings: Vec<(InstanceOf<S>, Vec<f64>)>,
 }
 
 /// What candidates are measured by.
@@ -184,6 +199,7 @@ impl<'a, S: Study> Engine<'a, S> {
             instances,
             not_tried,
             base_count: model.parameters.len(),
+            beginnings: Vec::new(),
         })
     }
 
@@ -465,6 +481,16 @@ impl<'a, S: Study> Engine<'a, S> {
             Some(before) => try_again(study, model, before, &base.theta, &self.hints, step),
         };
         drop(progress);
+        for (instance, start) in &self.beginnings {
+            let extended = study.extend(model, instance);
+            if let Ok(fit) = self.minimise(&extended, View::COARSE, start, REFINE) {
+                tried.push(Tried {
+                    instance: *instance,
+                    model: extended,
+                    fit,
+                });
+            }
+        }
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
         // One for each effect and site: its best discrete choice, of which one with more parameters has to pay for them (Schwarz
         // 1978).

@@ -23,7 +23,7 @@ pub use comparison::compare_cutting::{CutError, CuttingComparison};
 pub use comparison::explained::Explained;
 pub use cutting_lead::{CuttingLead, LineGroup, LineKind, cutting_lead};
 pub use cutting_trends::{Against, Trend, cutting_trends};
-pub use diagnose::diagnose;
+pub use diagnose::{diagnose, diagnose_from};
 pub use diagnosis::Diagnosis;
 pub use outlook::next_measurement::NextMeasurement;
 pub use trend::TrendPoint;

@@ -10,6 +10,7 @@ use crate::ingest::formats::lvm;
 use crate::ingest::formats::mat;
 use crate::ingest::formats::numpy;
 use crate::ingest::formats::pulse;
+use crate::ingest::formats::twincat;
 use crate::ingest::formats::uff;
 use crate::ingest::tables::channel_names::{is_called_acceleration, is_called_hammer};
 use crate::ingest::tables::table::Header;
@@ -114,6 +115,7 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
     frf_text::join_signalcalc(&mut header);
     frf_text::join_said_above(&mut header)?;
     pulse::join(&mut header)?;
+    twincat::join(&mut header);
     let how = header.describe();
     if frf_text::is_frf_table(&header) {
         let why = format!("column names of FRFs ({}), {how}", abbreviated(&header.names));

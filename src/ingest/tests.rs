@@ -491,6 +491,28 @@ fn exports_of_pulse() {
     assert!(problem(bytes(spectrum)).contains("Autospectrum"));
 }
 
+/// TwinCAT Scope: keys above each channel, times in milliseconds, `EOF` at the end.
+#[test]
+fn exports_of_twincat_scope() {
+    let one = "Name\tScope Project1\t\nFile\tC:\\a.csv\t\nStarttime of export\t132930981542700000\tMittwoch\t09:15:54.270\n\n\n\
+        Name\tFx\nSymbolComment\t\nData-Type\tREAL64\nSampleTime\t10\nSymbolName\tMeasurement_Values.Force.x\nUnit\tN\n\
+        Unit Offset\t0\n\n\n0\t1.5\n10\t2.5\n20\t3.5\n30\t4.5\nEOF\n";
+    let (record, _) = time(one);
+    assert_eq!((record.sample_rate_hz, record.channels.len()), (100.0, 1));
+    let channel = &record.channels[0];
+    assert_eq!((channel.name.as_str(), channel.role), ("Fx", ChannelRole::ForceX));
+    assert_eq!(channel.samples, [1.5, 2.5, 3.5, 4.5]);
+    let two = "Name\tScope Project1\t\n\nName\tFx\tName\tFy\nData-Type\tREAL64\tData-Type\tREAL64\n\
+        SampleTime\t10\tSampleTime\t10\nSymbolName\tA.x\tSymbolName\tA.y\nUnit\tN\tUnit\tN\n\
+        Unit Offset\t0\tUnit Offset\t0\n\n0\t1.5\t0\t7\n10\t2.5\t10\t8\n20\t3.5\t20\t9\n30\t4.5\t30\t9\nEOF\n";
+    let (record, _) = time(two);
+    let fy = record.channels.iter().find(|c| c.name == "Fy").unwrap();
+    assert_eq!(
+        (fy.role, fy.samples[2], record.sample_rate_hz),
+        (ChannelRole::ForceY, 9.0, 100.0)
+    );
+}
+
 /// A running number in front, with a name or without (pandas).
 #[test]
 fn frf_tables_behind_a_running_number() {

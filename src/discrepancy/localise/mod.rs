@@ -6,6 +6,7 @@
 //! the model itself, the model's own parameters with them, and judged by BIC; where one displacement of a place leaves more
 //! than noise, a second of the same place is tried with it. The leaders have to predict postures that were left out.
 
+pub mod named;
 pub mod screen;
 #[cfg(test)]
 pub(in crate::discrepancy) mod tests;

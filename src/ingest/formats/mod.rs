@@ -10,6 +10,7 @@ pub(crate) mod numpy;
 pub(crate) mod packed;
 pub(crate) mod pulse;
 pub(crate) mod tdms;
+pub(crate) mod twincat;
 pub(crate) mod uff;
 pub(crate) mod waveform;
 pub(crate) mod workbook;

@@ -1,0 +1,54 @@
+//! Whether what the data draw is an effect of the library that a diagnosis did not see.
+
+use rayon::prelude::*;
+
+use super::Localisation;
+use crate::Result;
+use crate::effects::{Instance, Structure};
+use crate::identify::levenberg_marquardt::Stopping;
+use crate::identify::study::{Study, View};
+use crate::identify::{LeastSquares, StructureModel, StructureStudy, minimise};
+
+/// Share of what the drawn form takes away that an effect must take away in a few steps to be worth another diagnosis.
+const ALIKE: f64 = 0.7;
+const FEW_STEPS: Stopping = Stopping {
+    max_iterations: 8,
+    relative_decrease: 1e-3,
+};
+
+/// The effect of the library that does nearly what the drawn form does at the best place of `found`, and its fit's parameters with
+/// those of `model` in front (solver's scale). What is missing may drive the joints so far that its own name is not seen from there,
+/// while the drawn form has put them right; sizes of the same name begin where it has them.
+///
+/// # Errors
+/// A model that does not respond.
+pub fn named(
+    study: &StructureStudy,
+    model: &StructureModel,
+    found: &Localisation,
+) -> Result<Option<(Instance<Structure>, Vec<f64>)>> {
+    let Some(best) = found.places.first().and_then(|place| place.best.as_ref()) else {
+        return Ok(None);
+    };
+    let count = model.parameters.len();
+    let without = study.problem(model, View::GLANCE).cost(&found.baseline.theta)?;
+    let drawn = study.problem(&best.model, View::GLANCE).cost(&best.theta)?;
+    let instances = study.instances(model).0;
+    let fits = instances.par_iter().filter_map(|instance| {
+        let extended = study.extend(model, instance);
+        let own = extended.parameters[count..].iter().map(|p| {
+            let mut drawn = best.parts().flat_map(|part| &part.parameters);
+            // `branch@link-3.x.mass_kg`
+            let drawn = drawn.find(|d| d.name.rsplit('.').next() == p.name.rsplit('.').next());
+            p.internal(drawn.map_or(p.nominal, |d| d.value.clamp(p.bounds[0], p.bounds[1])))
+        });
+        let start: Vec<f64> = best.theta[..count].iter().copied().chain(own).collect();
+        let problem = study.problem(&extended, View::GLANCE);
+        let fit = minimise(&problem, &start, &extended.bounds(), FEW_STEPS).ok()?;
+        Some((fit.cost, *instance, fit.theta))
+    });
+    let nearest = fits.min_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(nearest
+        .filter(|(cost, ..)| drawn < without && without - cost > ALIKE * (without - drawn))
+        .map(|(_, instance, theta)| (instance, theta)))
+}

@@ -30,7 +30,7 @@ lobestone explain tool-flexibility
 
 The pictures show one campaign each in which the effect hides at a usual size (`scripts/effect_fingerprints.py`). For FRFs: the error
 in multiples of the noise, by posture, direction and band, of the model without the effect after its joints were tuned, and with it; and the
-FRF that it changes most. For forces: a turn of the tool, or the drill's averages. **Look-alikes** are other effects, and the share of what
+FRF that it changes most. For forces: a turn of the tool, the drill's averages, or (chatter) the error by order of rotation. **Look-alikes** are other effects, and the share of what
 this one leaves above the noise that each explains in that campaign in its stead: nine tenths and more are hard to tell apart, less
 than half is seen at once.
 """

@@ -5,6 +5,7 @@
 
 mod answer;
 pub mod case_study;
+pub mod checked;
 mod cutting_reading;
 pub mod cutting_tables;
 pub mod drawn_case;

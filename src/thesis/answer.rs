@@ -1,6 +1,7 @@
 //! The real case's answer in plain words, from its numbers.
 
-use super::real_case::{BandCheck, Explanation, RealCase, WIDENED};
+use super::checked::BandCheck;
+use super::real_case::{Explanation, RealCase, WIDENED};
 use crate::discrepancy::DiagnosisVerdict;
 use crate::discrepancy::verdict::is_convincing;
 use crate::text::chance;

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::real_case::{BandCheck, FarthestJoint, checks};
+use super::checked::{BandCheck, FarthestJoint, checked};
 use crate::Result;
 use crate::discrepancy::verdict::STRONG_BIC;
 use crate::effects::drawn::{self, DrawnForm};
@@ -33,7 +33,7 @@ pub struct DrawnCase {
     /// Laws that were fitted, over all places.
     pub laws: usize,
     /// The best laws, the best first.
-    pub parts: Vec<DrawnPart>,
+    pub parts: Vec<DrawnLaw>,
     /// Laws whose BIC is within "very strong" of the best one's, the best among them, and none of whose sizes is at the end of its
     /// range.
     pub as_good: usize,
@@ -43,7 +43,7 @@ pub struct DrawnCase {
 
 /// A law at a place.
 #[derive(Debug, Clone, Serialize)]
-pub struct DrawnPart {
+pub struct DrawnLaw {
     /// As `lobestone add` takes it: `series@bearing-2.rx`.
     pub name: String,
     /// In words: `a spring in the bearing of joint 2 (rx)`.
@@ -100,24 +100,24 @@ pub fn drawn_case(
         .iter()
         .map(|(_, t)| reduced(t.fit.cost, t.model.parameters.len()));
     let scale = least.fold(f64::INFINITY, f64::min).max(1.0);
-    let mut parts: Vec<(Spot, DrawnPart)> = fits
+    let mut parts: Vec<(Spot, DrawnLaw)> = fits
         .iter()
         .map(|(spot, tried)| {
             let own = model.parameters.len()..tried.model.parameters.len();
             let price = own.len() as f64 * values.ln();
-            let checked = checks(study, &tried.model, &tried.fit.theta)?;
+            let check = checked(study, &tried.model, &tried.fit.theta)?;
             let form = drawn::form_of(tried.instance.variant);
-            let part = DrawnPart {
+            let part = DrawnLaw {
                 name: tried.instance.label(),
                 words: format!("{} {}", form.words(), spot.words()),
                 parameters: estimates(&tried.model.parameters, &tried.fit, scale)?[own.clone()].to_vec(),
                 delta_bic: price - 2.0 * (base_cost - tried.fit.cost) / scale,
                 reduced_chi2: reduced(tried.fit.cost, tried.model.parameters.len()),
                 at_bound: own.clone().any(|i| tried.fit.at_bound.contains(&i)),
-                met: checked.met,
-                bands: checked.bands,
-                static_ratio: checked.static_ratio,
-                farthest_joint: checked.farthest_joint,
+                met: check.met,
+                bands: check.bands,
+                static_ratio: check.static_ratio,
+                farthest_joint: check.farthest_joint,
             };
             Ok((*spot, part))
         })
@@ -127,7 +127,7 @@ pub fn drawn_case(
         .iter()
         .find(|(_, p)| !p.at_bound)
         .map_or(0.0, |(_, p)| p.delta_bic);
-    let as_good: Vec<&(Spot, DrawnPart)> = parts
+    let as_good: Vec<&(Spot, DrawnLaw)> = parts
         .iter()
         .filter(|(_, p)| !p.at_bound && p.delta_bic < (best + STRONG_BIC).min(0.0))
         .collect();

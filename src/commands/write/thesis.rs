@@ -10,7 +10,7 @@ use crate::lobes::Peak;
 use crate::report::number::{format_si, plus_minus};
 use crate::report::sections::thesis_section;
 use crate::report::words::{parameter, parameter_of};
-use crate::thesis::drawn_case::{DrawnCase, DrawnPart};
+use crate::thesis::drawn_case::{DrawnCase, DrawnLaw};
 use crate::thesis::real_case::Explanation;
 use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
 
@@ -161,7 +161,7 @@ fn real_case(case: &RealCase) -> String {
 }
 
 fn drawn(drawn: &DrawnCase) -> String {
-    let row = |part: &DrawnPart| {
+    let row = |part: &DrawnLaw| {
         let sizes = part.parameters.iter();
         let sizes: Vec<String> = sizes
             .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))

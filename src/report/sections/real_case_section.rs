@@ -7,7 +7,7 @@ use crate::report::parts::{figure, paragraph};
 use crate::report::words::{at_place, parameter};
 use crate::report::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
-use crate::thesis::drawn_case::DrawnPart;
+use crate::thesis::drawn_case::DrawnLaw;
 use crate::thesis::real_case::{CONFIGURATIONS, Explanation};
 
 pub fn blocks(case: &RealCase) -> Vec<Block> {
@@ -125,7 +125,7 @@ fn explanations(case: &RealCase) -> [Block; 2] {
 }
 
 fn drawn(case: &RealCase) -> Block {
-    let row = |part: &DrawnPart| {
+    let row = |part: &DrawnLaw| {
         let sizes: Vec<String> = part
             .parameters
             .iter()

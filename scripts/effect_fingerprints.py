@@ -5,8 +5,8 @@
 
 For each effect one campaign in which it hides at a usual size: `lobestone simulate --effect` with a careful measurement of little
 noise, or a practice campaign of tests/data/practice for effects whose records `simulate` does not make. Pictures are those of
-`lobestone report`: docs/pictures/effects/EFFECT.png (FRFs: error against noise without and with the effect; forces: a turn of
-the tool without and with it) and EFFECT-frf.png. How near others come is what `lobestone diagnose` says of its candidates:
+`lobestone report`, put into docs/pictures/effects under the effect's name (FRFs: error against noise without and with the effect, and
+the FRF that it changes most; forces: a turn of the tool without and with it). How near others come is what `lobestone diagnose` says of its candidates:
 docs/pictures/effects/look-alikes.json, which scripts/effect_catalogue.py writes into docs/effects.md. Only the standard library is used.
 """
 

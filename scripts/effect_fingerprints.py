@@ -15,8 +15,9 @@ import gzip
 import json
 import pathlib
 import shutil
-import subprocess
 import tempfile
+
+from random_campaigns import lobestone
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 OUT = ROOT / "docs/pictures/effects"
@@ -39,13 +40,6 @@ PICTURES = {
 }
 # Vibration beside the rotation is not in the mean of the turns.
 BETTER = {"chatter": [(["waveform-orders"], "")]}
-
-
-def lobestone(program, *arguments):
-    run = subprocess.run([program, *arguments, "--json"], capture_output=True, text=True)
-    if run.returncode != 0:
-        raise SystemExit(f"lobestone {' '.join(arguments)} failed:\n{run.stderr}")
-    return json.loads(run.stdout)
 
 
 def campaign(program, effect, folder):

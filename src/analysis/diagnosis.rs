@@ -89,10 +89,10 @@ impl<D: CampaignSide> Findings<D> {
         if let Some(found) = &lead
             && let Some(named) = D::named(&case, &study, found)?
         {
-            let again = diagnose_from(&study, &case.model, vec![named])?;
+            let again = diagnose_from(&study, &case.model, named)?;
             if again.verdict == DiagnosisVerdict::Effect {
+                // The files are not to blame: nothing of the setup has to be heeded.
                 diagnosis = again;
-                heed_setup(&mut diagnosis, &setup);
                 now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
                 lead = None;
             }

@@ -521,7 +521,7 @@ mod tests {
     }
 
     use crate::identify::CuttingModel;
-    use crate::identify::forces::made_cuts::{METAL, MILLED, milled};
+    use crate::identify::forces::made_cuts::{METAL, MILLED, milled, with_orders_of};
 
     /// A mean that is off by 2 N in six blocks of 1 N error, and an order that is off by 5 N of 1 N: amplitudes of 2 N and 10 N, mean
     /// squares less those of the noise, 1/6 N² and 2 N².
@@ -535,13 +535,13 @@ mod tests {
         };
         let fit = problem.fits(&METAL).unwrap().remove(0);
         let cut = std::sync::Arc::make_mut(&mut data.cuts[0]);
+        with_orders_of(cut, &fit);
         for (channel, made) in cut
             .channels
             .iter_mut()
             .flatten()
             .zip(fit.channels.iter().flatten())
         {
-            channel.orders.clone_from(&made.orders);
             let sum = made.level.iter().zip(&made.reference);
             channel.level = sum.map(|(force, zero)| force + zero).collect();
         }

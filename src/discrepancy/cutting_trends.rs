@@ -441,7 +441,7 @@ mod tests {
     }
 
     use crate::identify::CuttingModel;
-    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned};
+    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned, with_orders_of};
     use approx::assert_relative_eq;
 
     /// Forces 3 % larger than the model's, known to the noise over the force: of F N in n values of 1 N error each to 1/(F √n).
@@ -511,14 +511,7 @@ mod tests {
         let mut rippled = data.clone();
         for (cut, fit) in rippled.cuts.iter_mut().zip(&fits) {
             let cut = std::sync::Arc::make_mut(cut);
-            for (channel, made) in cut
-                .channels
-                .iter_mut()
-                .flatten()
-                .zip(fit.channels.iter().flatten())
-            {
-                channel.orders.clone_from(&made.orders);
-            }
+            with_orders_of(cut, fit);
             let y = cut.channels[1].as_mut().unwrap();
             y.orders[1] += Complex64::from_polar(4.0, 0.5 - 2.0 * fit.placement);
         }

@@ -108,17 +108,17 @@ fn price_of_a_parameter(independent_values: f64) -> f64 {
 
 /// Diagnoses `model` (with the effects it already has).
 pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::Domain>> {
-    diagnose_from(study, model, Vec::new())
+    Engine::new(study, model)?.run()
 }
 
-/// As [`diagnose`]; effects are tried from these points (the model's parameters and their own, solver's scale), too.
+/// As [`diagnose`]; one effect is tried from a point besides (the model's parameters and its own, solver's scale).
 pub fn diagnose_from<S: Study>(
     study: &S,
     model: &ModelOf<S>,
-    beginnings: Vec<(InstanceOf<S>, Vec<f64>)>,
+    beginning: (InstanceOf<S>, Vec<f64>),
 ) -> Result<Diagnosis<S::Domain>> {
     Engine {
-        beginnings,
+        beginning: Some(beginning),
         ..Engine::new(study, model)?
     }
     .run()
@@ -168,8 +168,8 @@ struct Engine<'a, S: Study> {
     instances: Vec<InstanceOf<S>>,
     not_tried: Vec<(String, String)>,
     base_count: usize,
-    /// Effects, and a point from which each is tried besides.
-    beginnings: Vec<(InstanceOf<S>, Vec<f64>)>,
+    /// An effect, and a point from which it is tried besides.
+    beginning: Option<(InstanceOf<S>, Vec<f64>)>,
 }
 
 /// What candidates are measured by.
@@ -199,7 +199,7 @@ impl<'a, S: Study> Engine<'a, S> {
             instances,
             not_tried,
             base_count: model.parameters.len(),
-            beginnings: Vec::new(),
+            beginning: None,
         })
     }
 
@@ -481,7 +481,7 @@ impl<'a, S: Study> Engine<'a, S> {
             Some(before) => try_again(study, model, before, &base.theta, &self.hints, step),
         };
         drop(progress);
-        for (instance, start) in &self.beginnings {
+        if let Some((instance, start)) = &self.beginning {
             let extended = study.extend(model, instance);
             if let Ok(fit) = self.minimise(&extended, View::COARSE, start, REFINE) {
                 tried.push(Tried {

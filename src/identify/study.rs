@@ -278,14 +278,6 @@ const SETTLE: Stopping = Stopping {
     relative_decrease: 1e-4,
 };
 
-/// Where a fit may begin.
-struct Start {
-    /// Which of the points of the parameters in front it has.
-    base: usize,
-    cost: f64,
-    theta: Vec<f64>,
-}
-
 /// Fits the effect added last to `model` on the coarse view, without being trapped by where the fit without it stood.
 /// `bases`: points for the parameters in front of the effect's; `own`: points for its own; both on the solver's scale.
 fn screen<S: Study>(
@@ -353,49 +345,28 @@ pub fn look<S: Study>(
         Effort::Direct | Effort::Staged => &[],
     }
     .iter()
-    .enumerate()
-    .filter_map(|(k, base)| Some((k, linear_size(&likelihood, model, base)?.theta)));
-    let mut starts: Vec<Start> = bases
+    .filter_map(|base| Some(linear_size(&likelihood, model, base)?.theta));
+    let mut starts: Vec<(f64, Vec<f64>)> = bases
         .iter()
-        .enumerate()
-        .flat_map(|(k, base)| {
-            let starts = own.iter().map(move |own| [base.as_slice(), own].concat());
-            starts.map(move |start| (k, start))
-        })
+        .flat_map(|base| own.iter().map(move |own| [base.as_slice(), own].concat()))
         .chain(of_linear_size)
-        .map(|(base, theta)| Start {
-            base,
-            cost: likelihood.cost(&theta).unwrap_or(f64::INFINITY),
-            theta,
-        })
+        .map(|start| (likelihood.cost(&start).unwrap_or(f64::INFINITY), start))
         .collect();
-    starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let best = starts.first().map_or(f64::INFINITY, |s| s.cost);
-    let is_trap = 2.0 * best > TRAP_MISFIT * study.real_values(extent) as f64;
+    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = starts.first().map_or(f64::INFINITY, |s| s.0);
     starts.truncate(MOST_STARTS);
     // A start close to where the effect vanishes costs little and promises nothing: one step tells (it is a score test
     // there). A start that is hopelessly high needs the rough misfit first.
-    let mut steps: Vec<Start> = starts
+    let mut steps: Vec<(f64, Vec<f64>)> = starts
         .iter()
-        .filter(|s| s.cost <= HOPELESS * best)
-        .filter_map(|s| {
-            let (cost, theta) = one_step(&likelihood, &s.theta, &bounds).ok()?;
-            Some(Start { cost, theta, ..*s })
-        })
+        .filter(|s| s.0 <= HOPELESS * best)
+        .filter_map(|(_, start)| one_step(&likelihood, start, &bounds).ok())
         .collect();
-    steps.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    // From where a strong effect that is missing has driven the parameters in front a few steps need not lead back.
-    let followed: Vec<&Start> = match effort {
-        Effort::Look if is_trap => (0..bases.len())
-            .filter_map(|k| steps.iter().find(|s| s.base == k))
-            .collect(),
-        Effort::Look => steps.iter().take(1).collect(),
-        Effort::Direct | Effort::Staged => steps.iter().take(2).collect(),
-    };
-    for step in followed {
-        keep(minimise(&likelihood, &step.theta, &bounds, LOOK));
+    steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+    for (_, step) in steps.iter().take(if effort == Effort::Look { 1 } else { 2 }) {
+        keep(minimise(&likelihood, step, &bounds, LOOK));
     }
-    if effort == Effort::Staged && is_trap {
+    if effort == Effort::Staged && 2.0 * best > TRAP_MISFIT * study.real_values(Extent::Coarse) as f64 {
         let longer = Stopping {
             max_iterations: 10,
             ..LOOK

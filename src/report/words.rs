@@ -1,9 +1,10 @@
 //! What people call things that have a key: effects, places, parameters, how sure a verdict is.
 
-use super::number::significant;
+use super::number::{format_si, significant};
 use crate::discrepancy::TrendPoint;
 use crate::discrepancy::joint_trends::{JointAgainst, JointTrend};
 use crate::effects::Site;
+use crate::identify::Estimate;
 use crate::text::{capitalised, chance};
 
 /// `local-resonator` → `local resonator`.
@@ -20,6 +21,12 @@ pub fn place(site: Site) -> Option<String> {
         Site::Tool => Some("at the tool".into()),
         Site::At(spot) => Some(spot.words()),
     }
+}
+
+/// `mass 5.70 kg, frequency 20.9 Hz`.
+pub fn sizes(parameters: &[Estimate]) -> String {
+    let one = |p: &Estimate| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3));
+    parameters.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// Endings of keys that are units, longest first where one ends in another, and the units.

@@ -19,7 +19,7 @@ impl RealCase {
         let mut answer = vec![self.verdict_text()];
         if let Some(best) = self.best() {
             answer.push(self.proposal_text(best));
-            for (band, check) in best.bands.iter().enumerate() {
+            for (band, check) in best.checked.bands.iter().enumerate() {
                 answer.push(self.band_text(best, band, check));
             }
         }
@@ -89,7 +89,7 @@ impl RealCase {
     }
 
     fn band_text(&self, best: &Explanation, band: usize, check: &BandCheck) -> String {
-        let met = |e: &Explanation| e.bands[band].met;
+        let met = |e: &Explanation| e.checked.bands[band].met;
         let others: Vec<String> = self
             .candidates
             .iter()
@@ -102,11 +102,11 @@ impl RealCase {
             format!("; rivals: {}", others.join(", "))
         };
         let told = |e: &Explanation| {
-            let band = &e.bands[band];
+            let band = &e.checked.bands[band];
             if band.explained {
                 return format!("explained by {}", e.name);
             }
-            let why = match &e.farthest_joint {
+            let why = match &e.checked.farthest_joint {
                 Some(joint) if !joint.is_credible() => format!(
                     "{} would have to be {:.2} times as stiff as published, {:.1} standard deviations of its tolerance",
                     joint.name.trim_end_matches(".stiffness"),
@@ -162,16 +162,16 @@ impl RealCase {
         };
         let fixed = |[low, high]: [f64; 2]| format!("{low:.2}–{high:.2}");
         let best = self.best().map_or(String::new(), |best| {
-            format!(", with {} {}", best.name, fixed(best.static_ratio))
+            format!(", with {} {}", best.name, fixed(best.checked.static_ratio))
         });
         format!(
             "The plainest rival needs no new physics: with rigid links tuned to all resonances, not only the strongest, {} \
              of {} resonances find a mode within four standard deviations; for that {moved}, which nobody would believe without further \
              evidence. A check that no fit saw, static stiffness at the flange, \
              model over measurement: rigid links {}{best}.",
-            self.baseline.met,
+            self.baseline.checked.met,
             self.resonances.len(),
-            fixed(self.baseline.static_ratio),
+            fixed(self.baseline.checked.static_ratio),
         )
     }
 

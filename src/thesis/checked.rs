@@ -13,8 +13,10 @@ const CLOSE_SIGMAS: f64 = 2.0;
 /// A joint farther from its published stiffness than this many standard deviations of its tolerance (a factor of 2.5 where
 /// the tolerance is 0.3) is no longer that joint: what a model reaches by that is not explained.
 const CREDIBLE_SIGMAS: f64 = 3.0;
+
 /// How a model with a solution meets the tables.
-pub(super) struct Checked {
+#[derive(Debug, Clone, Serialize)]
+pub struct Checked {
     /// Resonances that have a mode within four standard deviations, of all.
     pub met: usize,
     /// The bands of recurring resonances.

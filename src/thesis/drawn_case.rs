@@ -4,15 +4,15 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::checked::{BandCheck, FarthestJoint, checked};
+use super::checked::{Checked, checked};
 use crate::Result;
 use crate::discrepancy::verdict::STRONG_BIC;
 use crate::effects::drawn::{self, DrawnForm};
 use crate::effects::{Instance, Spot, Structure};
 use crate::identify::frfs::calibrate::estimates;
 use crate::identify::resonances::resonance_study::ResonanceStudy;
-use crate::identify::study::{Effort, Study, try_effect};
-use crate::identify::{Estimate, StructureModel};
+use crate::identify::study::{Effort, Extent, Study, View, try_effect};
+use crate::identify::{Estimate, LeastSquares, StructureModel};
 
 /// Laws that frequencies and sizes can show; what only damps is lost in them.
 const LAWS: [DrawnForm; 5] = [
@@ -56,22 +56,13 @@ pub struct DrawnLaw {
     pub reduced_chi2: f64,
     /// Whether a parameter ended at the end of its range.
     pub at_bound: bool,
-    /// Resonances that have a mode within four standard deviations, of all.
-    pub met: usize,
-    /// The bands of recurring resonances.
-    pub bands: Vec<BandCheck>,
-    /// Static stiffness at the flange, model over measurement, least and greatest: never fitted.
-    pub static_ratio: [f64; 2],
-    /// The joint that had to be moved farthest for that.
-    pub farthest_joint: Option<FarthestJoint>,
+    /// How it meets the tables.
+    #[serde(flatten)]
+    pub checked: Checked,
 }
 
-/// Fits every law at every place besides the joints of `model`; `base`: their fit and its cost.
-pub fn drawn_case(
-    study: &ResonanceStudy,
-    model: &StructureModel,
-    (base, base_cost): (&[f64], f64),
-) -> Result<DrawnCase> {
+/// Fits every law at every place besides the joints of `model`; `base`: their fit (solver's scale).
+pub fn drawn_case(study: &ResonanceStudy, model: &StructureModel, base: &[f64]) -> Result<DrawnCase> {
     let robot = &model.robot.spec;
     let spots: Vec<Spot> = Spot::parallel(robot)
         .into_iter()
@@ -84,6 +75,7 @@ pub fn drawn_case(
             forms.map(|form| (*spot, drawn::instance(*spot, form)))
         })
         .collect();
+    let base_cost = study.problem(model, View::FULL).cost(base)?;
     let bases = [base.to_vec(), model.nominal_theta()];
     let hints = study.hints(model, base)?;
     let fits: Vec<_> = instances
@@ -93,7 +85,7 @@ pub fn drawn_case(
             Some((*spot, tried))
         })
         .collect();
-    let values = study.real_values(crate::identify::study::Extent::Full) as f64;
+    let values = study.real_values(Extent::Full) as f64;
     let reduced = |cost: f64, parameters: usize| 2.0 * cost / (values - parameters as f64).max(1.0);
     // What even the best leaves scales what counts as chance, as in a diagnosis.
     let least = fits
@@ -105,7 +97,6 @@ pub fn drawn_case(
         .map(|(spot, tried)| {
             let own = model.parameters.len()..tried.model.parameters.len();
             let price = own.len() as f64 * values.ln();
-            let check = checked(study, &tried.model, &tried.fit.theta)?;
             let form = drawn::form_of(tried.instance.variant);
             let part = DrawnLaw {
                 name: tried.instance.label(),
@@ -114,10 +105,7 @@ pub fn drawn_case(
                 delta_bic: price - 2.0 * (base_cost - tried.fit.cost) / scale,
                 reduced_chi2: reduced(tried.fit.cost, tried.model.parameters.len()),
                 at_bound: own.clone().any(|i| tried.fit.at_bound.contains(&i)),
-                met: check.met,
-                bands: check.bands,
-                static_ratio: check.static_ratio,
-                farthest_joint: check.farthest_joint,
+                checked: checked(study, &tried.model, &tried.fit.theta)?,
             };
             Ok((*spot, part))
         })
@@ -168,13 +156,17 @@ impl DrawnCase {
         let mut answer = vec![format!(
             "{tried} First comes {}: BIC {:+.1}, {:.1} times the variance that the assumed accuracy allows; static stiffness at the flange, which no \
              fit saw, {:.2}–{:.2} of the measured.",
-            best.words, best.delta_bic, best.reduced_chi2, best.static_ratio[0], best.static_ratio[1],
+            best.words,
+            best.delta_bic,
+            best.reduced_chi2,
+            best.checked.static_ratio[0],
+            best.checked.static_ratio[1],
         )];
-        for (k, band) in best.bands.iter().enumerate() {
+        for (k, band) in best.checked.bands.iter().enumerate() {
             let by: Vec<&str> = self
                 .parts
                 .iter()
-                .filter(|p| !p.at_bound && p.bands[k].explained)
+                .filter(|p| !p.at_bound && p.checked.bands[k].explained)
                 .map(|p| p.words.as_str())
                 .collect();
             let by = match by.as_slice() {

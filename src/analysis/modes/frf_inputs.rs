@@ -52,28 +52,24 @@ struct Unsaid {
 
 /// FRFs that were read as `reading.unsaid` for want of better, beside files that say what theirs are: made what those are, and told.
 pub(crate) fn settle_unsaid(inputs: &mut [FrfInput], reading: &FrfReading, told: &mut Told) {
-    let [first, rest @ ..] = told.said.as_slice() else {
-        return tell_unsaid(reading.unsaid, "", told);
+    let common = told
+        .said
+        .first()
+        .copied()
+        .filter(|first| reading.unsaid_like_the_rest && told.said.iter().all(|q| q == first));
+    let (taken_as, why) = match common {
+        Some(common) => (common, " as those of the other files"),
+        None => (reading.unsaid, ""),
     };
-    let common = rest.iter().all(|q| q == first).then_some(*first);
-    let Some(common) = common.filter(|_| reading.unsaid_like_the_rest) else {
-        return tell_unsaid(reading.unsaid, "", told);
-    };
+    // Back to what the file has, and again.
+    let order = order(Some(taken_as)) - order(Some(reading.unsaid));
     for unsaid in &told.unsaid {
         let theirs = |i: &&mut FrfInput| i.set == unsaid.file && unsaid.names.contains(&i.name);
-        for input in inputs.iter_mut().filter(theirs) {
-            // Back to what the file has, and again.
-            let order = order(Some(common)) - order(Some(reading.unsaid));
+        for input in inputs.iter_mut().filter(theirs).filter(|_| order != 0) {
             for (f, v) in input.frequency_hz.iter().zip(&mut input.receptance_m_per_n) {
                 *v /= Complex64::new(0.0, TAU * f).powi(order);
             }
         }
-    }
-    tell_unsaid(common, " as those of the other files", told);
-}
-
-fn tell_unsaid(taken_as: Quantity, why: &str, told: &mut Told) {
-    for unsaid in &told.unsaid {
         told.warnings.push(format!(
             "{}: the file does not say what its {} FRFs are; taken as {}{why} (another: --quantity)",
             unsaid.file,
@@ -195,11 +191,7 @@ fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
 
 /// Derivatives with respect to time that make the quantity of a displacement.
 fn order(quantity: Option<Quantity>) -> i32 {
-    match quantity {
-        None | Some(Quantity::Receptance) => 0,
-        Some(Quantity::Mobility) => 1,
-        Some(Quantity::Accelerance) => 2,
-    }
+    quantity.map_or(0, |q| i32::from(q.derivatives()))
 }
 
 /// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes

@@ -9,7 +9,7 @@ use crate::cutting::{KnownValue, MILLING_COEFFICIENTS};
 use crate::lobes::Peak;
 use crate::report::number::{format_si, plus_minus};
 use crate::report::sections::thesis_section;
-use crate::report::words::{parameter, parameter_of};
+use crate::report::words::{parameter_of, sizes};
 use crate::thesis::drawn_case::{DrawnCase, DrawnLaw};
 use crate::thesis::real_case::Explanation;
 use crate::thesis::{CaseStudy, ComparedRow, CuttingTables, LobeTips, RealCase, ThesisFindings};
@@ -104,29 +104,25 @@ fn tips(name: &str, tips: &LobeTips) -> Vec<String> {
 /// The loop on the tables: every explanation, then the answer in words.
 fn real_case(case: &RealCase) -> String {
     let row = |e: &Explanation| {
-        let parameters: Vec<String> = e
-            .parameters
-            .iter()
-            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
-            .collect();
         let bands: Vec<String> = e
+            .checked
             .bands
             .iter()
             .map(|b| format!("{}/{}", b.met, b.measured))
             .collect();
-        let [low, high] = e.static_ratio;
+        let [low, high] = e.checked.static_ratio;
         vec![
             e.name.clone(),
             format!("{:+.1}", e.delta_bic),
             format!("{:.0e}", e.p_value),
             format!("{:.1}", e.reduced_chi2),
             format!("{:.0}", e.held_out_chi2),
-            format!("{}/{}", e.met, case.resonances.len()),
+            format!("{}/{}", e.checked.met, case.resonances.len()),
             bands.join(", "),
             format!("{low:.2}-{high:.2}"),
             format!("{:.2}", e.weight),
             if e.at_bound { "at its bound" } else { "" }.to_string(),
-            parameters.join(", "),
+            sizes(&e.parameters),
         ]
     };
     let header = [
@@ -162,16 +158,13 @@ fn real_case(case: &RealCase) -> String {
 
 fn drawn(drawn: &DrawnCase) -> String {
     let row = |part: &DrawnLaw| {
-        let sizes = part.parameters.iter();
-        let sizes: Vec<String> = sizes
-            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
-            .collect();
         let bands: Vec<String> = part
+            .checked
             .bands
             .iter()
             .map(|b| format!("{}/{}", b.close, b.measured))
             .collect();
-        let [low, high] = part.static_ratio;
+        let [low, high] = part.checked.static_ratio;
         vec![
             part.name.clone(),
             format!("{:+.1}", part.delta_bic),
@@ -179,7 +172,7 @@ fn drawn(drawn: &DrawnCase) -> String {
             bands.join(", "),
             format!("{low:.2}-{high:.2}"),
             if part.at_bound { "at its bound" } else { "" }.to_string(),
-            sizes.join(", "),
+            sizes(&part.parameters),
         ]
     };
     let header = [

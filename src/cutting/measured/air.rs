@@ -192,7 +192,7 @@ pub(crate) fn air_notices(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutting::measured::cut_analysis::{Average, Trace, TurnAverage};
+    use crate::cutting::measured::cut_analysis::{Average, made_channel};
 
     /// Samples at 100 Hz of what the closure says of the time, s: a cut of `cut_s` between air.
     fn record(seconds: f64, value: impl Fn(f64) -> f64) -> Vec<f64> {
@@ -289,28 +289,13 @@ mod tests {
     }
 
     fn channel(axis: ForceAxis, value: f64, change: impl Fn(&mut DriftLine)) -> ChannelAnalysis {
-        let mut drift = fit_drift(&[], 100.0, 0.0, &Air::default());
-        change(&mut drift);
-        ChannelAnalysis {
-            name: String::new(),
-            axis,
-            drift,
-            mean: TurnAverage {
-                average: Average {
-                    value,
-                    std_error: 1.0,
-                },
-                turns: 10,
-                turn_std: Some(1.0),
-                zero_std: 0.0,
-                dropped: 0,
-            },
-            trace: Trace {
-                time_s: Vec::new(),
-                min: Vec::new(),
-                max: Vec::new(),
-            },
-        }
+        let average = Average {
+            value,
+            std_error: 1.0,
+        };
+        let mut channel = made_channel(axis, average);
+        change(&mut channel.drift);
+        channel
     }
 
     fn told(channels: &[ChannelAnalysis]) -> Vec<&'static str> {

@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(turn_std(&[1.0]), None);
     }
 
-    use crate::cutting::measured::cut_analysis::Trace;
+    use crate::cutting::measured::cut_analysis::made_channel;
     use crate::data::Process;
     use crate::signal::{Air, fit_drift};
     use approx::assert_relative_eq;
@@ -247,25 +247,15 @@ mod tests {
     }
 
     fn cut(forces: [f64; 2], torque: f64, turns: usize, scatter: f64) -> CutAnalysis {
-        let channel = |axis, value: f64, size: f64| ChannelAnalysis {
-            name: String::new(),
-            axis,
-            drift: fit_drift(&[], 100.0, 0.0, &Air::default()),
-            mean: TurnAverage {
-                average: Average {
-                    value,
-                    std_error: 123.0,
-                },
-                turns,
-                turn_std: Some(scatter * size),
-                zero_std: 0.0,
-                dropped: 0,
-            },
-            trace: Trace {
-                time_s: Vec::new(),
-                min: Vec::new(),
-                max: Vec::new(),
-            },
+        let channel = |axis, value: f64, size: f64| {
+            let average = Average {
+                value,
+                std_error: 123.0,
+            };
+            let mut channel = made_channel(axis, average);
+            channel.mean.turns = turns;
+            channel.mean.turn_std = Some(scatter * size);
+            channel
         };
         let size = forces[0].hypot(forces[1]);
         CutAnalysis {

@@ -147,30 +147,36 @@ pub(crate) fn in_tool_axes(
     averages
 }
 
+/// A channel of ten turns for tests: nothing but its average, above a zero of 0.
+#[cfg(test)]
+pub(super) fn made_channel(axis: ForceAxis, average: Average) -> ChannelAnalysis {
+    use crate::signal::{Air, fit_drift};
+    ChannelAnalysis {
+        name: String::new(),
+        axis,
+        drift: fit_drift(&[], 100.0, 0.0, &Air::default()),
+        mean: TurnAverage {
+            average,
+            turns: 10,
+            turn_std: Some(1.0),
+            zero_std: 0.0,
+            dropped: 0,
+        },
+        trace: Trace {
+            time_s: Vec::new(),
+            min: Vec::new(),
+            max: Vec::new(),
+        },
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::{Air, fit_drift};
     use approx::assert_relative_eq;
 
     fn channel(axis: ForceAxis, value: f64, std_error: f64) -> ChannelAnalysis {
-        ChannelAnalysis {
-            name: String::new(),
-            axis,
-            drift: fit_drift(&[], 100.0, 0.0, &Air::default()),
-            mean: TurnAverage {
-                average: Average { value, std_error },
-                turns: 10,
-                turn_std: Some(1.0),
-                zero_std: 0.0,
-                dropped: 0,
-            },
-            trace: Trace {
-                time_s: Vec::new(),
-                min: Vec::new(),
-                max: Vec::new(),
-            },
-        }
+        made_channel(axis, Average { value, std_error })
     }
 
     /// A dynamometer turned by 30° about z: 100 N along its x and 50 N along its y, each known to 3 N and 4 N.

@@ -270,7 +270,7 @@ fn independent_share(data: &CuttingData, fits: &[CutFit]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned};
+    use crate::identify::forces::made_cuts::{METAL, MILLED, changed, milled, turned, with_orders_of};
     use approx::assert_relative_eq;
     use rand::SeedableRng;
 
@@ -289,14 +289,7 @@ mod tests {
             let mut data = data.clone();
             for ((cut, fit), sign) in data.cuts.iter_mut().zip(&fits).zip(signs) {
                 let cut = std::sync::Arc::make_mut(cut);
-                for (channel, model) in cut
-                    .channels
-                    .iter_mut()
-                    .flatten()
-                    .zip(fit.channels.iter().flatten())
-                {
-                    channel.orders.clone_from(&model.orders);
-                }
+                with_orders_of(cut, fit);
                 // Order 3 of x: 4 N at an angle of the tool, recorded from the angle at which it stood; errors of 2 N.
                 let x = cut.channels[0].as_mut().unwrap();
                 x.orders[2] += Complex64::from_polar(4.0 * sign, 0.5 - 3.0 * fit.placement);

@@ -12,6 +12,7 @@ use crate::cutting::{EdgeBit, feed_mm};
 use crate::data::{CutGeometry, Immersion, Process};
 use crate::effects::cutting::CutSetting;
 use crate::identify::forces::cutting_data::{CutData, CutKind, CuttingData, ForceChannel};
+use crate::identify::forces::cutting_problem::CutFit;
 
 pub(crate) const AS_IT_IS: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Ktc Krc Kac, N/mm², and Kte Kre Kae, N/mm: about those of aluminium.
@@ -227,4 +228,12 @@ pub(crate) fn changed(data: &CuttingData, change: impl Fn(&mut CutData)) -> Cutt
         change(Arc::make_mut(cut));
     }
     data
+}
+
+/// Gives a cut the orders that the model has.
+pub(crate) fn with_orders_of(cut: &mut CutData, fit: &CutFit) {
+    let channels = cut.channels.iter_mut().flatten();
+    for (channel, made) in channels.zip(fit.channels.iter().flatten()) {
+        channel.orders.clone_from(&made.orders);
+    }
 }

@@ -20,9 +20,11 @@ pub(super) struct LevelChange {
     pub loud: [f64; 2],
 }
 
+/// Power of the motion stretch by stretch.
+type Motion = [f64; STRETCHES];
+
 /// Says where the motion is much larger than in the rest, where that is one stretch of some length.
-pub(super) fn level_changes(channels: &[Vec<f64>]) -> Option<LevelChange> {
-    let motion = motion(channels)?;
+pub(super) fn level_changes(motion: &Motion) -> Option<LevelChange> {
     let middle = |mut values: Vec<f64>| -> Option<f64> {
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied()
@@ -47,8 +49,7 @@ pub(super) fn level_changes(channels: &[Vec<f64>]) -> Option<LevelChange> {
 }
 
 /// From where to where, as shares of the record, nearly all motion lies, if that is one brief stretch of it.
-pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
-    let motion = motion(channels)?;
+pub(super) fn one_event(motion: &Motion) -> Option<[f64; 2]> {
     let whole: f64 = motion.iter().sum();
     let brief = (BRIEF * STRETCHES as f64) as usize;
     let (from, held) = motion
@@ -66,8 +67,8 @@ pub(super) fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
     Some([share(*loud.first()?), share(loud.last()? + 1)])
 }
 
-/// Power of the motion stretch by stretch, each channel with the weight one.
-fn motion(channels: &[Vec<f64>]) -> Option<[f64; STRETCHES]> {
+/// Each channel with the weight one; `None` for a record of a few samples.
+pub(super) fn motion(channels: &[Vec<f64>]) -> Option<Motion> {
     let lines = channels.first()?.len();
     let length = lines / STRETCHES;
     if length < 2 {
@@ -100,7 +101,15 @@ fn squares_about_mean(values: &[f64]) -> f64 {
 mod tests {
     use std::f64::consts::TAU;
 
-    use super::*;
+    use super::{LevelChange, motion};
+
+    fn one_event(channels: &[Vec<f64>]) -> Option<[f64; 2]> {
+        super::one_event(&motion(channels)?)
+    }
+
+    fn level_changes(channels: &[Vec<f64>]) -> Option<LevelChange> {
+        super::level_changes(&motion(channels)?)
+    }
 
     fn record(motion: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
         let samples = (0..8000).map(|k| f64::from(k) / 1000.0);

@@ -92,7 +92,8 @@ pub fn operational_modes(
         sample_rate_hz: rate_hz,
         ..OperationalModes::default()
     };
-    if let Some(event) = event::one_event(&channels) {
+    let motion = event::motion(&channels);
+    if let Some(event) = motion.as_ref().and_then(event::one_event) {
         let seconds = channels.first().map_or(0, Vec::len) as f64 / rate_hz;
         return Err(InputError::new(format!(
             "the motion is one event: nearly all of it lies between {:.2} and {:.2} s of {seconds:.2} s (a release, a drop, a single hit)",
@@ -105,7 +106,7 @@ pub fn operational_modes(
         )
         .into());
     }
-    let changes = event::level_changes(&channels);
+    let changes = motion.as_ref().and_then(event::level_changes);
     result.harmonics = harmonics::take_out(&mut channels, rate_hz, band_hz, settings.spindle_rpm);
     let scale: Vec<f64> = channels.iter().map(|c| rms(c)).collect();
     if let Some(still) = scale.iter().position(|s| !(*s > 0.0)) {

@@ -1,10 +1,9 @@
 //! The loop on the thesis' own tables: which effect they propose, and how far to trust it.
 
-use crate::identify::Estimate;
 use crate::report::figure::{ResonanceFigure, ResonanceRow};
-use crate::report::number::{decimals, format_si, significant};
+use crate::report::number::{decimals, significant};
 use crate::report::parts::{figure, paragraph};
-use crate::report::words::{at_place, parameter};
+use crate::report::words::{at_place, parameter, sizes};
 use crate::report::{Block, ReportTable, TableColumn};
 use crate::thesis::RealCase;
 use crate::thesis::drawn_case::DrawnLaw;
@@ -44,7 +43,7 @@ fn resonance_figure(case: &RealCase) -> Block {
             after_hz: case.best_modes_hz.get(i).cloned().unwrap_or_default(),
         })
     });
-    let bands = case.baseline.bands.iter().map(|b| (b.from_hz, b.to_hz));
+    let bands = case.baseline.checked.bands.iter().map(|b| (b.from_hz, b.to_hz));
     let title = "Measured resonances and the model's modes";
     let drawing = ResonanceFigure {
         title: title.into(),
@@ -61,31 +60,31 @@ fn resonance_figure(case: &RealCase) -> Block {
 fn explanations(case: &RealCase) -> [Block; 2] {
     let row = |e: &Explanation| {
         let bands: Vec<String> = e
+            .checked
             .bands
             .iter()
             .map(|b| format!("{} of {}", b.met, b.measured))
             .collect();
-        let [low, high] = e.static_ratio;
+        let [low, high] = e.checked.static_ratio;
         vec![
             at_place(&e.name),
             decimals(e.delta_bic, 1),
             significant(e.p_value, 2),
             decimals(e.reduced_chi2, 1),
             decimals(e.held_out_chi2, 0),
-            format!("{} of {}", e.met, case.resonances.len()),
+            format!("{} of {}", e.checked.met, case.resonances.len()),
             bands.join("; "),
             format!("{} to {}", decimals(low, 2), decimals(high, 2)),
             decimals(e.weight, 2),
         ]
     };
-    let sizes = |e: &Explanation| {
-        let one = |p: &Estimate| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3));
-        let sizes: Vec<String> = e.parameters.iter().map(one).collect();
+    let how_big = |e: &Explanation| {
         let bound = if e.at_bound { " (at its bound)" } else { "" };
-        vec![at_place(&e.name), format!("{}{bound}", sizes.join(", "))]
+        vec![at_place(&e.name), format!("{}{bound}", sizes(&e.parameters))]
     };
     let bands: Vec<String> = case
         .baseline
+        .checked
         .bands
         .iter()
         .map(|b| format!("{}–{} Hz", b.from_hz, b.to_hz))
@@ -118,7 +117,7 @@ fn explanations(case: &RealCase) -> [Block; 2] {
     let fitted = Block::Table(ReportTable {
         caption: "How big each would have to be".into(),
         columns: vec![TableColumn::text("explanation"), TableColumn::text("best fit")],
-        rows: case.candidates.iter().map(sizes).collect(),
+        rows: case.candidates.iter().map(how_big).collect(),
         notes: Vec::new(),
     });
     [judged, fitted]
@@ -126,23 +125,19 @@ fn explanations(case: &RealCase) -> [Block; 2] {
 
 fn drawn(case: &RealCase) -> Block {
     let row = |part: &DrawnLaw| {
-        let sizes: Vec<String> = part
-            .parameters
-            .iter()
-            .map(|p| format!("{} {}", parameter(&p.name), format_si(p.value, p.unit, 3)))
-            .collect();
         let bands: Vec<String> = part
+            .checked
             .bands
             .iter()
             .map(|b| format!("{} of {}", b.close, b.measured))
             .collect();
-        let joint = part.farthest_joint.as_ref();
-        let [low, high] = part.static_ratio;
+        let joint = part.checked.farthest_joint.as_ref();
+        let [low, high] = part.checked.static_ratio;
         vec![
             part.words.clone(),
             format!(
                 "{}{}",
-                sizes.join(", "),
+                sizes(&part.parameters),
                 if part.at_bound { " (at its bound)" } else { "" }
             ),
             decimals(part.delta_bic, 1),

@@ -17,19 +17,24 @@ pub struct SignalBlocks {
 impl SignalBlocks {
     /// Cuts `samples` into as many blocks as there are, their edges rounded to samples; a rest at the end is left out.
     pub fn new(samples: &[f64], samples_per_block: f64) -> SignalBlocks {
+        SignalBlocks::of(samples.len(), |i| samples[i], samples_per_block)
+    }
+
+    /// The same of `samples` values that `value` makes of their index.
+    pub fn of(samples: usize, value: impl Fn(usize) -> f64, samples_per_block: f64) -> SignalBlocks {
         let count = if samples_per_block >= 1.0 {
-            ((samples.len() as f64 + 0.5 - 1e-9) / samples_per_block).floor() as usize
+            ((samples as f64 + 0.5 - 1e-9) / samples_per_block).floor() as usize
         } else {
             0
         };
-        let edge = |i: usize| ((i as f64 * samples_per_block).round() as usize).min(samples.len());
+        let edge = |i: usize| ((i as f64 * samples_per_block).round() as usize).min(samples);
         let (mut mean, mut std_dev) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for i in 0..count {
-            let block = &samples[edge(i)..edge(i + 1)];
-            let n = block.len().max(1) as f64;
-            let m = block.iter().sum::<f64>() / n;
+            let block = || (edge(i)..edge(i + 1)).map(&value);
+            let n = block().len().max(1) as f64;
+            let m = block().sum::<f64>() / n;
             mean.push(m);
-            std_dev.push((block.iter().map(|v| (v - m).powi(2)).sum::<f64>() / n).sqrt());
+            std_dev.push((block().map(|v| (v - m).powi(2)).sum::<f64>() / n).sqrt());
         }
         // A ramp of height d within a block has variance d²/12.
         for i in 1..count.saturating_sub(1) {

@@ -273,8 +273,7 @@ fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
     if none_stands_out(samples, within.len() - rank) {
         return Vec::new();
     }
-    let mut heights: Vec<f64> = within.clone().map(height).collect();
-    let (_, &mut usual, _) = heights.select_nth_unstable_by(rank, f64::total_cmp);
+    let usual = highest(within.clone().map(height), within.len() - rank);
     if usual == 0.0 {
         return Vec::new();
     }
@@ -340,6 +339,32 @@ fn none_stands_out(samples: &[f64], upper: usize) -> bool {
         })
 }
 
+/// The least of the `count` highest values.
+fn highest(values: impl Iterator<Item = f64>, count: usize) -> f64 {
+    let count = count.max(1);
+    // Never more than twice as many are kept.
+    let mut kept: Vec<f64> = Vec::with_capacity(2 * count);
+    let keep = |kept: &mut Vec<f64>| {
+        if kept.len() > count {
+            kept.select_nth_unstable_by(count - 1, |a, b| b.total_cmp(a));
+            kept.truncate(count);
+        }
+    };
+    let mut least = f64::NEG_INFINITY;
+    for value in values {
+        if value < least {
+            continue;
+        }
+        kept.push(value);
+        if kept.len() == 2 * count {
+            keep(&mut kept);
+            least = kept.iter().copied().fold(f64::INFINITY, f64::min);
+        }
+    }
+    keep(&mut kept);
+    kept.into_iter().fold(f64::INFINITY, f64::min)
+}
+
 fn come_back_evenly(found: &[Range<usize>]) -> bool {
     if found.len() < 6 {
         return false;
@@ -358,6 +383,16 @@ fn come_back_evenly(found: &[Range<usize>]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_least_of_the_highest_is_that_of_the_sorted_values() {
+        let values: Vec<f64> = (0..1000).map(|i| f64::from(i * 7919 % 1000)).collect();
+        for count in [1, 2, 5, 17, 999, 1000] {
+            let expected = 1000.0 - count as f64;
+            assert_eq!(highest(values.iter().copied(), count), expected);
+        }
+        assert_eq!(highest([3.0; 40].into_iter(), 5), 3.0);
+    }
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

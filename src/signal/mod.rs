@@ -20,7 +20,9 @@ pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub(crate) use faults::least_and_greatest;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
-pub use order_spectrum::{OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum};
+pub use order_spectrum::{
+    OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum, order_spectrum_above,
+};
 pub use spindle_track::{SpindleTrack, spindle_track};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

@@ -6,6 +6,7 @@
 //! revolution.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
@@ -41,6 +42,12 @@ pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
     wanted.min((0.45 * samples_per_revolution).floor().max(0.0) as usize)
 }
 
+/// Samples that are transformed at once, at most: a longer window's lines are the mean power of its pieces, so that memory does not
+/// grow with the record. 52 s at 10 kHz.
+const PIECE: usize = 1 << 19;
+/// Revolutions that a piece holds at least.
+const PIECE_REVOLUTIONS: f64 = 16.0;
+
 /// `samples`: the steady window, its baseline taken off; `samples_per_revolution` is not a whole number in general and
 /// the last revolution may end within a sample. `None` where there are less than two revolutions,
 /// which tell no scatter.
@@ -50,6 +57,35 @@ pub fn order_spectrum(
     samples_per_revolution: f64,
     orders: usize,
 ) -> Option<OrderSpectrum> {
+    order_spectrum_above(samples, |_| 0.0, sample_rate_hz, samples_per_revolution, orders)
+}
+
+/// The same of samples that `zero` (of a sample's index) is still to be taken off.
+pub fn order_spectrum_above(
+    samples: &[f64],
+    zero: impl Fn(usize) -> f64,
+    sample_rate_hz: f64,
+    samples_per_revolution: f64,
+    orders: usize,
+) -> Option<OrderSpectrum> {
+    spectrum_by_pieces(
+        samples,
+        zero,
+        sample_rate_hz,
+        samples_per_revolution,
+        orders,
+        PIECE,
+    )
+}
+
+fn spectrum_by_pieces(
+    samples: &[f64],
+    zero: impl Fn(usize) -> f64,
+    sample_rate_hz: f64,
+    samples_per_revolution: f64,
+    orders: usize,
+    longest: usize,
+) -> Option<OrderSpectrum> {
     let revolutions = (samples.len() as f64 / samples_per_revolution + 1e-6).floor();
     if !(revolutions >= 2.0) {
         return None;
@@ -58,42 +94,88 @@ pub fn order_spectrum(
     let count = (length.ceil() as usize).min(samples.len());
     // The last sample counts as far as the revolution reaches into it.
     let last = (length - (count as f64 - 1.0)).clamp(0.0, 1.0);
-    let trend = Trend::new(&samples[..count], revolutions as usize, samples_per_revolution);
-    let value: Vec<f64> = (0..count).map(|i| samples[i] - trend.at(i)).collect();
+    let above_zero = |i: usize| samples[i] - zero(i);
+    let trend = Trend::new(above_zero, count, revolutions as usize, samples_per_revolution);
+    // Pieces of whole revolutions, to the sample; what is left over at the end has no lines of its own.
+    let per_piece = (longest as f64 / samples_per_revolution)
+        .floor()
+        .max(PIECE_REVOLUTIONS);
+    let piece = if count <= longest || revolutions < 2.0 * per_piece {
+        count
+    } else {
+        (per_piece * samples_per_revolution).round() as usize
+    };
+    let pieces = count / piece;
+    let value = |range: Range<usize>, buffer: &mut Vec<f64>| {
+        buffer.clear();
+        buffer.extend(range.map(|i| above_zero(i) - trend.at(i)));
+    };
 
     let turn = Turn::new(samples_per_revolution);
-    let coefficient = Arch::new().dispatch(Project {
-        value: &value,
-        last,
-        length,
-        turn: &turn,
-        orders,
-    });
-    // In the place of the values: long records are many times longer than all that comes of them.
-    let mut rest = value;
-    Arch::new().dispatch(TakeAway {
-        value: &mut rest,
-        coefficient: &coefficient,
-        turn: &turn,
-    });
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
+    let (mut buffer, mut sums) = (Vec::with_capacity(piece), vec![[[0.0; 8]; 2]; orders]);
+    for first in (0..count).step_by(piece) {
+        let end = (first + piece).min(count);
+        value(first..end, &mut buffer);
+        if end == count
+            && let Some(value) = buffer.last_mut()
+        {
+            *value *= last;
+        }
+        Arch::new().dispatch(Project {
+            value: &buffer,
+            first,
+            turn: &turn,
+            sums: &mut sums,
+        });
+    }
+    let total = |part: [f64; 8]| part.iter().sum::<f64>() / length;
+    let coefficient: Vec<Complex64> = sums
+        .into_iter()
+        .map(|[re, im]| Complex64::new(total(re), total(im)))
+        .collect();
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(piece);
     let mut spectrum = transform.make_output_vec();
-    transform.process(&mut rest, &mut spectrum).ok()?;
-    drop(rest);
-    let rest: Vec<f64> = spectrum.iter().map(|c| c.norm() / count as f64).collect();
-    drop(spectrum);
-    let line_hz = sample_rate_hz / count as f64;
+    let mut scratch = transform.make_scratch_vec();
+    let mut rest = vec![0.0; spectrum.len()];
+    for first in (0..pieces).map(|k| k * piece) {
+        value(first..first + piece, &mut buffer);
+        Arch::new().dispatch(TakeAway {
+            value: &mut buffer,
+            first,
+            coefficient: &coefficient,
+            turn: &turn,
+        });
+        transform
+            .process_with_scratch(&mut buffer, &mut spectrum, &mut scratch)
+            .ok()?;
+        for (sum, c) in rest.iter_mut().zip(&spectrum) {
+            *sum += c.norm_sqr();
+        }
+    }
+    drop((buffer, spectrum, scratch));
+    let mean_of_pieces = |power: f64| (power / pieces as f64).sqrt() / piece as f64;
+    rest.iter_mut().for_each(|power| *power = mean_of_pieces(*power));
+    let line_hz = sample_rate_hz / piece as f64;
 
-    let lines_per_order = revolutions * count as f64 / length;
+    // A single piece is `count` samples long, all revolutions.
+    let lines_per_order = match pieces {
+        1 => revolutions * count as f64 / length,
+        _ => piece as f64 / samples_per_revolution,
+    };
     let neighbourhood = |n: f64| {
         let (from, to) = ((n - 0.5) * lines_per_order, (n + 0.5) * lines_per_order);
         (from.ceil().max(1.0) as usize)..(to.floor() as usize + 1).min(rest.len())
     };
-    // One line of each neighbourhood, the order's own, was taken away.
-    let free_lines = |n: f64| neighbourhood(n).len().max(2) as f64 - 1.0;
+    // One line of each neighbourhood, the order's own, was taken away: of all pieces together.
+    let free_lines = |n: f64| (pieces * neighbourhood(n).len()).max(2) as f64 - 1.0;
+    // What a line of the whole window would hold of it.
+    let share = match pieces {
+        1 => 1.0,
+        _ => (pieces * piece) as f64 / length,
+    };
     let power = |n: f64| -> f64 {
         let lines = rest.get(neighbourhood(n));
-        lines.map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>()) / free_lines(n)
+        share * lines.map_or(0.0, |r| r.iter().map(|a| a * a).sum::<f64>()) / free_lines(n)
     };
     let own: Vec<f64> = (1..=orders).map(|n| power(n as f64)).collect();
     let std = (0..orders)
@@ -108,7 +190,8 @@ pub fn order_spectrum(
             variance.sqrt()
         })
         .collect();
-    // |X|² is exponentially distributed where there is noise only: its median is ln 2 of its mean.
+    // |X|² is exponentially distributed where there is noise only: its median is ln 2 of its mean; the mean of several pieces
+    // comes nearer to it.
     // The lines of the orders themselves are taken away: with few revolutions they are a good part of all.
     let is_order = |j: usize| {
         if revolutions >= MANY_REVOLUTIONS {
@@ -119,7 +202,11 @@ pub fn order_spectrum(
     };
     let between = rest.iter().enumerate().filter(|(j, _)| !is_order(*j));
     let squares: Vec<f64> = between.map(|(_, a)| a * a).collect();
-    let sample_std = (median(&squares) / std::f64::consts::LN_2 * count as f64).sqrt();
+    let median_of_mean = match pieces {
+        1 => std::f64::consts::LN_2,
+        _ => median_of_chi2(2.0 * pieces as f64),
+    };
+    let sample_std = (median(&squares) / median_of_mean * piece as f64).sqrt();
     Some(OrderSpectrum {
         coefficient,
         std,
@@ -167,34 +254,26 @@ impl Turn {
     }
 }
 
-/// Σ x e^(−inθ) over all samples, divided by `length`, for the orders from 1 on; the last sample counts as `last` says.
+/// Adds Σ x e^(−inθ) over the samples from `first` on for the orders from 1 on, one part for every eighth sample.
 /// (A type of its own: a closure is compiled for the plainest processor where it is not inlined.)
 struct Project<'a> {
     value: &'a [f64],
-    last: f64,
-    length: f64,
+    first: usize,
     turn: &'a Turn,
-    orders: usize,
+    sums: &'a mut [[[f64; 8]; 2]],
 }
 
 impl WithSimd for Project<'_> {
-    type Output = Vec<Complex64>;
+    type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<Complex64> {
-        // Of every eighth sample.
-        let mut sum = vec![[[0.0; 8]; 2]; self.orders];
-        let end = self.value.len();
+    fn with_simd<S: Simd>(self, _: S) {
         for (block, value) in self.value.chunks(LANES).enumerate() {
-            let first = block * LANES;
             let mut re = [0.0; LANES];
             re[..value.len()].copy_from_slice(value);
-            if first + value.len() == end {
-                re[value.len() - 1] *= self.last;
-            }
             let mut im = [0.0; LANES];
-            let [cosine, sine] = self.turn.at(first);
-            for sum in &mut sum {
+            let [cosine, sine] = self.turn.at(self.first + block * LANES);
+            for sum in self.sums.iter_mut() {
                 for k in 0..LANES {
                     let (a, b) = (re[k], im[k]);
                     re[k] = a * cosine[k] - b * sine[k];
@@ -206,16 +285,13 @@ impl WithSimd for Project<'_> {
                 }
             }
         }
-        let total = |part: [f64; 8]| part.iter().sum::<f64>() / self.length;
-        sum.into_iter()
-            .map(|[re, im]| Complex64::new(total(re), total(im)))
-            .collect()
     }
 }
 
-/// Takes 2 Re Σ c e^(inθ) off every sample.
+/// Takes 2 Re Σ c e^(inθ) off every sample from `first` on.
 struct TakeAway<'a> {
     value: &'a mut [f64],
+    first: usize,
     coefficient: &'a [Complex64],
     turn: &'a Turn,
 }
@@ -226,7 +302,7 @@ impl WithSimd for TakeAway<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         for (block, value) in self.value.chunks_mut(LANES).enumerate() {
-            let [cosine, sine] = self.turn.at(block * LANES);
+            let [cosine, sine] = self.turn.at(self.first + block * LANES);
             let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
             // Horner from the highest order.
             for c in self.coefficient.iter().rev() {
@@ -243,11 +319,16 @@ impl WithSimd for TakeAway<'_> {
     }
 }
 
+/// Median of a χ² of `freedom` normal values over its mean (Wilson & Hilferty 1931).
+fn median_of_chi2(freedom: f64) -> f64 {
+    (1.0 - 2.0 / (9.0 * freedom)).powi(3)
+}
+
 /// What the median of `count` mean squares of `freedom` normal values each is to be multiplied with, to be the variance by which
-/// squares are to be divided so that they are one on average: a χ² has its median below its mean (Wilson & Hilferty 1931), and
+/// squares are to be divided so that they are one on average: a χ² has its median below its mean, and
 /// the inverse of an estimate is larger than the inverse of what it estimates (a median is as good as 2/π of its values).
 fn median_to_weight(freedom: f64, count: usize) -> f64 {
-    let of_mean = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+    let of_mean = median_of_chi2(freedom);
     let pooled = (count as f64 * freedom * std::f64::consts::FRAC_2_PI).max(freedom);
     let inverse = if pooled > 4.0 {
         pooled / (pooled - 2.0)
@@ -265,11 +346,16 @@ struct Trend {
 }
 
 impl Trend {
-    fn new(samples: &[f64], revolutions: usize, samples_per_revolution: f64) -> Trend {
+    fn new(
+        value: impl Fn(usize) -> f64,
+        count: usize,
+        revolutions: usize,
+        samples_per_revolution: f64,
+    ) -> Trend {
         let terms = 1 + (revolutions / 4).min(3);
-        let scale = 2.0 / samples.len().max(2) as f64;
+        let scale = 2.0 / count.max(2) as f64;
         let edge = |r: usize| r as f64 * samples_per_revolution;
-        let mean = DVector::from_fn(revolutions, |r, _| mean_between(samples, edge(r), edge(r + 1)));
+        let mean = DVector::from_fn(revolutions, |r, _| mean_of(&value, count, edge(r), edge(r + 1)));
         let basis = DMatrix::from_fn(revolutions, terms, |r, k| {
             ((edge(r) + 0.5 * samples_per_revolution) * scale - 1.0).powi(k as i32)
         });
@@ -287,15 +373,20 @@ impl Trend {
 
 /// Mean of `samples` between two positions that need not be whole: a sample counts by the share of it that lies inside.
 pub fn mean_between(samples: &[f64], from: f64, to: f64) -> f64 {
-    let (from, to) = (from.max(0.0), to.min(samples.len() as f64));
+    mean_of(&|i| samples[i], samples.len(), from, to)
+}
+
+/// The same of `count` samples that `value` makes.
+fn mean_of(value: &impl Fn(usize) -> f64, count: usize, from: f64, to: f64) -> f64 {
+    let (from, to) = (from.max(0.0), to.min(count as f64));
     if !(to > from) {
         return 0.0;
     }
-    let (first, last) = (from.floor() as usize, (to.ceil() as usize).min(samples.len()));
+    let (first, last) = (from.floor() as usize, (to.ceil() as usize).min(count));
     let mut sum = 0.0;
-    for (i, v) in samples.iter().enumerate().take(last).skip(first) {
+    for i in first..last {
         let share = (to.min(i as f64 + 1.0) - from.max(i as f64)).max(0.0);
-        sum += v * share;
+        sum += value(i) * share;
     }
     sum / (to - from)
 }
@@ -363,6 +454,48 @@ mod tests {
         }
         let mean = coverage.iter().sum::<f64>() / coverage.len() as f64;
         assert!((0.85..1.15).contains(&mean), "{mean}");
+    }
+
+    /// In pieces: the same orders to the bit of rounding, the same noise, and a line beside the orders where it was.
+    #[test]
+    fn a_long_window_says_the_same_in_pieces() {
+        let (rate, per_turn, sigma) = (5000.0, 137.3, 2.0);
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let samples: Vec<f64> = (0..60_000)
+            .map(|i| {
+                let theta = TAU * i as f64 / per_turn;
+                let noise: f64 = crate::statistics::nearly_normal(&mut random);
+                let chatter = 5.0 * (TAU * 431.0 * i as f64 / rate).sin();
+                0.01 * i as f64 + 300.0 * (4.0 * theta).cos() - 20.0 * (17.0 * theta).sin()
+                    + chatter
+                    + sigma * noise
+            })
+            .collect();
+        let zero = |i: usize| 0.01 * i as f64;
+        let by = |longest| spectrum_by_pieces(&samples, zero, rate, per_turn, 40, longest).unwrap();
+        let (whole, pieces) = (by(1 << 19), by(1 << 13));
+        assert_eq!(whole.rest.len(), 30_000);
+        // 59 revolutions of 137.3 samples.
+        assert_eq!(pieces.rest.len(), 8101 / 2 + 1);
+        for (a, b) in whole.coefficient.iter().zip(&pieces.coefficient) {
+            assert!((a - b).norm() < 1e-9, "{a} {b}");
+        }
+        for (n, (a, b)) in whole.std.iter().zip(&pieces.std).enumerate() {
+            assert!((a / b - 1.0).abs() < 0.15, "order {}: {a} {b}", n + 1);
+        }
+        for spectrum in [&whole, &pieces] {
+            assert!(
+                (spectrum.sample_std / sigma - 1.0).abs() < 0.03,
+                "{}",
+                spectrum.sample_std
+            );
+            let lines = spectrum.rest.iter().enumerate();
+            let (peak, _) = lines.max_by(|a, b| a.1.total_cmp(b.1)).unwrap();
+            assert!((peak as f64 * spectrum.line_hz - 431.0).abs() < spectrum.line_hz);
+            // All of its power, whatever the width of a line.
+            let power: f64 = spectrum.rest[peak - 3..peak + 4].iter().map(|a| a * a).sum();
+            assert!((2.0 * power.sqrt() / 5.0 - 1.0).abs() < 0.05);
+        }
     }
 
     #[test]

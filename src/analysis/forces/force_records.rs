@@ -1,5 +1,6 @@
 //! A campaign's force records: read from their files and handed to [`crate::cutting`] as plain values.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -10,6 +11,7 @@ use crate::cutting::{
     CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, analyse_in_step,
     fit_force_coefficients, none_usable, repair_record,
 };
+use crate::data::Cut;
 use crate::identify::forces::cutting_data::CutData;
 use crate::ingest::{self, ChannelRole, Digest, TimeRecord};
 use crate::progress::Progress;
@@ -80,7 +82,8 @@ pub struct ForceRecords {
 }
 
 impl ForceRecords {
-    /// Each record is read once (in parallel, one record in memory per thread), however often this is asked for.
+    /// Each record is read once (in parallel, one record in memory per thread; long ones few at a time), however often this is
+    /// asked for.
     pub fn of(campaign: &Workbench) -> Arc<Self> {
         campaign
             .known()
@@ -103,8 +106,12 @@ impl ForceRecords {
                 Err(error) => (Err(error.clone()), Err(error), digest),
             }
         };
-        let cuts = (0..plain.cuts.len()).into_par_iter().map(one);
-        let read: Vec<(Result<CutAnalysis>, Result<Waveform>, Option<Digest>)> = cuts.collect();
+        let bytes = |cut: &Cut| std::fs::metadata(&cut.file).map_or(0, |m| m.len());
+        let sizes: Vec<u64> = plain.cuts.iter().map(bytes).collect();
+        let mut read: Vec<(Result<CutAnalysis>, Result<Waveform>, Option<Digest>)> = Vec::new();
+        for batch in batches(&sizes) {
+            read.par_extend(batch.into_par_iter().map(one));
+        }
         let (mut averages, mut waveforms, mut digests) = (Vec::new(), Vec::new(), Vec::new());
         for (average, waveform, digest) in read {
             averages.push(average);
@@ -114,6 +121,28 @@ impl ForceRecords {
         campaign.records_were_read(&digests);
         ForceRecords { averages, waveforms }
     }
+}
+
+/// Bytes of files whose records are held in memory at once, unless a single one has more.
+const AT_ONCE: u64 = 512 << 20;
+
+/// Files of these `sizes` in stretches of at most [`AT_ONCE`] bytes.
+fn batches(sizes: &[u64]) -> Vec<Range<usize>> {
+    let mut batches: Vec<Range<usize>> = Vec::new();
+    let mut held = 0;
+    for (i, size) in sizes.iter().enumerate() {
+        match batches.last_mut() {
+            Some(last) if held + size <= AT_ONCE => {
+                last.end = i + 1;
+                held += size;
+            }
+            _ => {
+                batches.push(i..i + 1);
+                held = *size;
+            }
+        }
+    }
+    batches
 }
 
 fn waveform(campaign: &Campaign, cut: usize, reading: &RecordReading) -> Result<Waveform> {
@@ -170,6 +199,14 @@ mod tests {
         off.take(3)
             .map(|(c, truth)| (c.value.unwrap() / truth - 1.0).abs())
             .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn few_long_records_are_in_memory_at_once() {
+        let mb = |sizes: &[u64]| batches(&sizes.iter().map(|mb| mb << 20).collect::<Vec<u64>>());
+        assert_eq!(mb(&[]), Vec::<Range<usize>>::new());
+        assert_eq!(mb(&[1; 40]), vec![0..40]);
+        assert_eq!(mb(&[300, 200, 300, 900, 1, 511]), vec![0..2, 2..3, 3..4, 4..6]);
     }
 
     #[test]

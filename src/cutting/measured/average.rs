@@ -27,8 +27,8 @@ pub(crate) fn average(
     record: &TimeRecord,
 ) -> TurnAverage {
     let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
-    let compensated: Vec<f64> = steady.clone().map(|i| values[i] - drift.at(time(i))).collect();
-    let blocks = SignalBlocks::new(&compensated, samples_per_revolution);
+    let compensated = |i: usize| values[steady.start + i] - drift.at(time(steady.start + i));
+    let blocks = SignalBlocks::of(steady.len(), compensated, samples_per_revolution);
     let centre = signal::median(&blocks.mean);
     let deviation: Vec<f64> = blocks.mean.iter().map(|m| (m - centre).abs()).collect();
     let limit = SPIKE_SIGMA * 1.4826 * signal::median(&deviation);
@@ -52,8 +52,9 @@ pub(crate) fn average(
         Some(std) => std / n.sqrt() * STUDENT[kept.len() - 2],
         None => {
             // One revolution is like no other: the samples themselves, which counts the ripple as noise.
-            let m = compensated.len().max(1) as f64;
-            (compensated.iter().map(|v| (v - value).powi(2)).sum::<f64>() / m).sqrt()
+            let m = steady.len().max(1) as f64;
+            let squares = (0..steady.len()).map(|i| (compensated(i) - value).powi(2));
+            (squares.sum::<f64>() / m).sqrt()
         }
     };
     let middle = 0.5 * (time(steady.start) + time(steady.end));

@@ -390,8 +390,8 @@ fn unsteady_notice(
                 .drift
                 .at(record.start_s + i as f64 / record.sample_rate_hz)
         };
-        let compensated: Vec<f64> = steady.clone().map(|i| values[i] - zero(i)).collect();
-        let turns = SignalBlocks::new(&compensated, samples_per_revolution);
+        let compensated = |i: usize| values[steady.start + i] - zero(steady.start + i);
+        let turns = SignalBlocks::of(steady.len(), compensated, samples_per_revolution);
         squares.resize(turns.len(), 0.0);
         for (k, square) in squares.iter_mut().enumerate() {
             let level = if has_zero { turns.mean[k] } else { 0.0 };

@@ -36,9 +36,24 @@ const SPREAD: usize = 4;
 /// Highest multiple of the tooth-passing frequency by which lines are followed.
 pub const MOST_SHIFT: i64 = 2;
 
-/// `spectra`: recorded channel, its spectrum, and a stretch of air.
-pub fn find_vibration(
-    spectra: &[(usize, OrderSpectrum, Vec<f64>)],
+/// Times its amplitude in the air that a line of the cut must have.
+const OVER_AIR: f64 = 4.0;
+/// The same of mains hum, which grows with the current of the drives under load.
+const MAINS_OVER_AIR: f64 = 20.0;
+/// Hz.
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
+/// Highest multiple of it that is looked for: rectifiers make those of six and twelve.
+const MOST_MAINS: f64 = 12.0;
+/// Part of it that it keeps to.
+const MAINS_KEPT: f64 = 0.002;
+/// Lines further apart than this, Hz, do not tell hum from anything.
+const MAINS_TOLD: f64 = 3.0;
+/// Frequencies looked at in the air to each side of a line, at most.
+const MOST_AIR_STEPS: f64 = 8.0;
+
+/// `spectra`: recorded channel, its spectrum, and a stretch of air. Mains hum that the air shows, or may hold, is none.
+pub fn find_vibration<A: AsRef<[f64]>>(
+    spectra: &[(usize, OrderSpectrum, A)],
     sample_rate_hz: f64,
     spindle_hz: f64,
     teeth: usize,
@@ -75,9 +90,16 @@ pub fn find_vibration(
     candidates.sort_by(|a, b| strength[*b].total_cmp(&strength[*a]));
     // A line that the air shows as well is hum, not cutting.
     let cutting = |j: usize| {
+        let hz = centre(&strength, j) * line_hz;
+        let is_mains = mains_beside(hz, line_hz);
         spectra.iter().any(|(_, s, air)| {
+            let air = air.as_ref();
+            if is_mains && air.len() < LEAST_AIR {
+                return false;
+            }
+            let times = if is_mains { MAINS_OVER_AIR } else { OVER_AIR };
             let cut = 2.0 * s.rest[j];
-            cut > 4.0 * line_amplitude(air, sample_rate_hz, j as f64 * line_hz) && s.rest[j] > 3.0 * floor(s)
+            s.rest[j] > 3.0 * floor(s) && cut > times * in_air(air, sample_rate_hz, hz, line_hz)
         })
     };
     let peak = candidates.into_iter().find(|j| cutting(*j))?;
@@ -104,6 +126,27 @@ pub fn find_vibration(
     Some(AsynchronousLines { frequency_hz, lines })
 }
 
+/// Amplitude of a line at `hz` in `air`, where the spectrum that it was found in places it to half its lines' distance.
+fn in_air(air: &[f64], sample_rate_hz: f64, hz: f64, line_hz: f64) -> f64 {
+    // Long air tells frequencies apart that the spectrum does not: a step of half its own lines' distance misses nothing.
+    let step = 0.5 * sample_rate_hz / air.len().max(1) as f64;
+    let steps = ((0.5 * line_hz / step).ceil().min(MOST_AIR_STEPS) as i64).max(1);
+    (-steps..=steps)
+        .map(|k| line_amplitude(air, sample_rate_hz, hz + k as f64 * 0.5 * line_hz / steps as f64))
+        .fold(0.0, f64::max)
+}
+
+/// Is this a multiple of a mains frequency, as nearly as the spectrum tells (its lines lie `line_hz` apart)?
+fn mains_beside(hz: f64, line_hz: f64) -> bool {
+    let near = |mains: &f64| {
+        let multiple = (hz / mains).round();
+        // The grid keeps its frequency to some per mille (EN 50160: 1 % for 99.5 % of the year).
+        let width = line_hz + MAINS_KEPT * hz;
+        (1.0..=MOST_MAINS).contains(&multiple) && (hz - multiple * mains).abs() < width
+    };
+    line_hz < MAINS_TOLD && MAINS_HZ.iter().any(near)
+}
+
 /// A line of a steady cut that stands above its surroundings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StandingLine {
@@ -122,8 +165,8 @@ const LEAST_AIR: usize = 64;
 
 /// All lines that the orders taken out of `spectra` (recorded channel, its spectrum, a stretch of air) leave standing,
 /// strongest first. `orders_taken`: the orders of `spindle_hz` are out, and what lies against them is their own unsteadiness.
-pub fn standing_lines(
-    spectra: &[(usize, OrderSpectrum, Vec<f64>)],
+pub fn standing_lines<A: AsRef<[f64]>>(
+    spectra: &[(usize, OrderSpectrum, A)],
     sample_rate_hz: f64,
     spindle_hz: f64,
     orders_taken: bool,
@@ -166,7 +209,8 @@ pub fn standing_lines(
             let sums = range.clone().map(|k| (strength[k], strength[k] * k as f64));
             let (sum, moment) = sums.fold((0.0, 0.0), |t, s| (t.0 + s.0, t.1 + s.1));
             let frequency_hz = moment / sum * line_hz;
-            let of = |(channel, s, air): &(usize, OrderSpectrum, Vec<f64>)| {
+            let of = |(channel, s, air): &(usize, OrderSpectrum, A)| {
+                let air = air.as_ref();
                 let power: f64 = s.rest[range.clone()].iter().map(|a| a * a).sum();
                 let noise = range.len() as f64 * floor(s).powi(2);
                 let in_air =
@@ -318,6 +362,29 @@ mod tests {
         // Noise of 1 N over 6000 samples has 0.013 N on a line: thirty times its power are 0.14 N of amplitude.
         assert_eq!(found(&[(430.0, 0.11)], &[]), None);
         assert!(found(&[(430.0, 0.19)], &[]).is_some());
+    }
+
+    /// Hum between two lines of the spectrum, in air so long that it tells the two apart, and hum that grows under load; a line there
+    /// that the air knows nothing of is a vibration, and without air nobody can tell.
+    #[test]
+    fn mains_hum_is_no_vibration() {
+        let hum = |cut: f64, in_air: f64, hz: f64, air_samples: usize| {
+            let (channel, spectrum, _) = seen(3, &[(hz, cut)], &[]);
+            let air: Vec<f64> = (0..air_samples)
+                .map(|i| in_air * (TAU * hz * i as f64 / RATE_HZ).sin() + 0.001 * (i as f64 * 1.7).sin())
+                .collect();
+            find_vibration(&[(channel, spectrum, air)], RATE_HZ, 47.3, 2).map(|v| v.frequency_hz)
+        };
+        // Any hum: 430.4 Hz lies between the lines of 1.2 s.
+        assert_eq!(hum(6.0, 6.0, 430.4, 40_000), None);
+        assert!(hum(6.0, 1.0, 430.4, 40_000).is_some());
+        // Of the mains: six times as much in the cut.
+        for hz in [150.0, 300.0, 360.0] {
+            assert_eq!(hum(6.0, 1.0, hz, 40_000), None, "{hz}");
+            assert!(hum(6.0, 0.0, hz, 40_000).is_some(), "{hz}");
+            assert_eq!(hum(6.0, 1.0, hz, 0), None, "{hz}");
+        }
+        assert!(hum(6.0, 0.0, 431.0, 0).is_some());
     }
 
     /// At 51 Hz and 5000 Hz of sampling, order 91 (4641 Hz) stands at 359 Hz: a fold, no vibration.

@@ -16,7 +16,7 @@ use crate::identify::forces::asynchronous_lines::{
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
 use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
-use crate::signal::{highest_order, line_amplitude, order_spectrum};
+use crate::signal::{highest_order, line_amplitude, order_spectrum_above};
 use crate::{Error, InputError, Result};
 
 /// What was cut.
@@ -110,12 +110,10 @@ impl CutData {
                 ChannelRole::TorqueZ,
             ][i];
             let values = record.channel(role)?.samples.as_slice();
-            let zeroed: Vec<f64> = values
-                .iter()
-                .enumerate()
-                .map(|(k, v)| v - channel.drift.at(record.start_s + k as f64 / rate))
-                .collect();
-            let spectrum = order_spectrum(&zeroed[window.steady.clone()], rate, per_turn, orders)?;
+            let zero = |k: usize| channel.drift.at(record.start_s + k as f64 / rate);
+            let first = window.steady.start;
+            let steady = &values[window.steady.clone()];
+            let spectrum = order_spectrum_above(steady, |k| zero(first + k), rate, per_turn, orders)?;
             let air_std = window
                 .air()
                 .map(|r| sample_std(&values[r]))
@@ -135,7 +133,7 @@ impl CutData {
                 .collect();
             let channel = force_channel(
                 values,
-                &zeroed,
+                zero,
                 rate,
                 &window,
                 &spectrum,
@@ -143,7 +141,7 @@ impl CutData {
                 &hum,
                 cut.spindle_rpm / 60.0,
             );
-            spectra.push((i, spectrum, quiet.map(|r| values[r].to_vec()).unwrap_or_default()));
+            spectra.push((i, spectrum, quiet.map_or(&[][..], |r| &values[r])));
             channel
         });
         if channels.iter().all(Option::is_none) {

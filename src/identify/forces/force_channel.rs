@@ -33,7 +33,7 @@ pub(crate) fn sample_std(samples: &[f64]) -> f64 {
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn force_channel(
     values: &[f64],
-    zeroed: &[f64],
+    zero: impl Fn(usize) -> f64,
     rate: f64,
     window: &Windows,
     spectrum: &OrderSpectrum,
@@ -48,14 +48,8 @@ pub(crate) fn force_channel(
         let sinc = if x.abs() < 1e-6 { 1.0 } else { x.sin() / x };
         0.5 * (amplitude * sinc).powi(2)
     };
-    let mut integral = Vec::with_capacity(values.len() + 1);
-    let mut sum = 0.0;
-    for v in zeroed {
-        integral.push(sum);
-        sum += v / rate;
-    }
-    integral.push(sum);
-    let (mut level, mut level_std, mut lost) = (Vec::new(), Vec::new(), Vec::new());
+    let lost = mean_integrals(values, zero, rate, &window.blocks);
+    let (mut level, mut level_std) = (Vec::new(), Vec::new());
     for (b, [from, to]) in window.blocks.iter().enumerate() {
         let std = if window.is_cut(b) {
             spectrum.sample_std.max(air_std)
@@ -68,7 +62,6 @@ pub(crate) fn force_channel(
         }
         level.push(mean_between(values, *from, *to));
         level_std.push((std * std / (to - from) + hum).sqrt());
-        lost.push(mean_between(&integral, *from + 0.5, *to + 0.5));
     }
     let order_std = spectrum
         .std
@@ -98,6 +91,28 @@ pub(crate) fn force_channel(
         && positive(&channel.order_std)
         && channel.orders.iter().all(|c| c.is_finite()))
     .then_some(channel)
+}
+
+/// Mean over each of the `blocks` (ascending, apart from one another) of ∫ (value − zero) dt up to the middle of each of its samples.
+fn mean_integrals(values: &[f64], zero: impl Fn(usize) -> f64, rate: f64, blocks: &[[f64; 2]]) -> Vec<f64> {
+    let mut means = Vec::with_capacity(blocks.len());
+    // ∫ up to sample `at`.
+    let (mut at, mut integral) = (0, 0.0);
+    for [from, to] in blocks {
+        let (from, to) = (from + 0.5, (to + 0.5).min(values.len() as f64 + 1.0));
+        let mut sum = 0.0;
+        while at <= values.len() && (at as f64) < to {
+            sum += integral * (to.min(at as f64 + 1.0) - from.max(at as f64)).max(0.0);
+            // A sample that the next block begins in counts there too.
+            if at as f64 + 1.0 > to {
+                break;
+            }
+            integral += values.get(at).map_or(0.0, |v| (v - zero(at)) / rate);
+            at += 1;
+        }
+        means.push(if to > from { sum / (to - from) } else { 0.0 });
+    }
+    means
 }
 
 /// A limit cycle's amplitude wanders by about this share while it lasts.
@@ -170,6 +185,22 @@ mod tests {
             .collect();
         approx::assert_relative_eq!(sample_std(&samples), 3.0, max_relative = 0.02);
         assert_eq!(sample_std(&[1.0]), 0.0);
+    }
+
+    #[test]
+    fn integrals_are_those_of_all_samples_kept() {
+        let values: Vec<f64> = (0..500).map(|i| (0.1 * f64::from(i)).sin() + 0.3).collect();
+        let zero = |i: usize| 0.001 * i as f64;
+        let mut integral = vec![0.0];
+        for (i, v) in values.iter().enumerate() {
+            integral.push(integral[i] + (v - zero(i)) / 50.0);
+        }
+        let blocks = [[0.0, 33.3], [33.3, 66.6], [120.2, 153.5], [466.7, 500.0]];
+        let means = mean_integrals(&values, zero, 50.0, &blocks);
+        for ([from, to], mean) in blocks.iter().zip(means) {
+            let expected = mean_between(&integral, from + 0.5, to + 0.5);
+            assert_relative_eq!(mean, expected, max_relative = 1e-12);
+        }
     }
 
     use crate::identify::forces::asynchronous_lines::VibrationLine;

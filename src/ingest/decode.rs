@@ -12,7 +12,7 @@ use crate::InputError;
 use crate::data::{FrfRecord, TimeRecord};
 use crate::ingest::formats::mat::NamedArrays;
 use crate::ingest::formats::{force, frf_text, lvm, numpy, tdms, uff, workbook};
-use crate::ingest::tables::{channel_names, stamps};
+use crate::ingest::tables::{channel_names, stamps, word_columns};
 
 /// Where a file holds one FRF that does not say where it was measured, its name may.
 pub(super) fn dofs_from_file_name(path: &Path, frfs: &mut [FrfRecord], notes: &mut Notes) {
@@ -91,9 +91,16 @@ fn read_as_it_is(
     let bytes = sheet.as_ref().map_or(bytes, |(text, _)| text.as_bytes());
     let mut seconds = None;
     let found = detect::detect(bytes, is_dwd_named).or_else(|problem| {
-        // Rows that begin with a clock are no table of numbers yet.
-        let (text, told) = stamps::as_seconds(bytes).ok_or_else(|| problem.clone())?;
-        let found = detect::detect(&text, is_dwd_named).map_err(|_| problem)?;
+        // Rows that begin with a clock are no table of numbers yet, nor are those with words in them.
+        let without_clock = stamps::as_seconds(bytes)
+            .and_then(|made| Some((detect::detect(&made.0, is_dwd_named).ok()?, made)));
+        let (found, (text, told)) = match without_clock {
+            Some((found, made)) => (found, made),
+            None => {
+                let made = word_columns::without_words(bytes).ok_or(problem)?;
+                (detect::detect(&made.0, is_dwd_named)?, made)
+            }
+        };
         notes.file(told);
         seconds = Some(text);
         Ok(found)

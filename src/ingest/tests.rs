@@ -544,7 +544,9 @@ fn lines_below_a_table_are_left_out_and_told() {
     let (record, warnings) = time(format!("{rows}EOF\n"));
     assert_eq!(record.channels[0].samples, [1.0, 2.0, 3.0, 4.0]);
     assert!(
-        warnings.iter().any(|w| w.contains("1 lines below the last row")),
+        warnings
+            .iter()
+            .any(|w| w.contains("1 line below the last row, \"EOF\", is no row")),
         "{warnings:?}"
     );
     // Words within a table are still an error, with their line.

@@ -73,8 +73,7 @@ pub fn median(values: &[f64]) -> f64 {
 /// Standard deviation from the median absolute deviation (normal consistency factor 1.4826).
 pub(crate) fn robust_std(values: &[f64]) -> f64 {
     let centre = median(values);
-    let deviation: Vec<f64> = values.iter().map(|v| (v - centre).abs()).collect();
-    1.4826 * median(&deviation)
+    1.4826 * quantile(values.iter().map(|v| (v - centre).abs()), 0.5).unwrap_or(0.0)
 }
 
 /// Straight line through points (x, y) by least squares: (value at mean x, slope, mean x).

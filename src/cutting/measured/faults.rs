@@ -74,15 +74,16 @@ pub fn repair_record(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
         notices.extend(stuck.map(|detail| notice(STUCK, detail)));
         notices.extend(spikes.map(|detail| notice(SPIKES, detail)));
         if count > 0 {
-            channel.samples = substituted(values, &bad, per_turn);
+            substitute(&mut channel.samples, &bad, per_turn);
         }
     }
     notices
 }
 
-/// Bad samples by the mean of those one revolution before and after (or two, …, where these are bad too).
-fn substituted(values: &[f64], bad: &[bool], per_turn: f64) -> Vec<f64> {
-    let at = |position: f64| -> Option<f64> {
+/// Puts in the place of bad samples the mean of those one revolution before and after (or two, …, where these are bad too).
+fn substitute(values: &mut [f64], bad: &[bool], per_turn: f64) {
+    // Only good samples are looked at, and those stay what they are.
+    let at = |values: &[f64], position: f64| -> Option<f64> {
         let low = position.floor();
         if !(low >= 0.0 && low + 1.0 < values.len() as f64) {
             return None;
@@ -90,25 +91,23 @@ fn substituted(values: &[f64], bad: &[bool], per_turn: f64) -> Vec<f64> {
         let (i, share) = (low as usize, position - low);
         (!bad[i] && !bad[i + 1]).then(|| values[i] + share * (values[i + 1] - values[i]))
     };
-    let beside = |i: usize| {
+    let beside = |values: &[f64], i: usize| {
         (1..=TURNS).find_map(|k| {
             let away = k as f64 * per_turn;
-            match (at(i as f64 - away), at(i as f64 + away)) {
+            match (at(values, i as f64 - away), at(values, i as f64 + away)) {
                 (Some(before), Some(after)) => Some(0.5 * (before + after)),
                 (one, other) => one.or(other),
             }
         })
     };
     let mut last_good = 0.0;
-    let good = |(i, v): (usize, &f64)| {
-        if !bad[i] {
-            last_good = *v;
-            *v
+    for i in 0..values.len() {
+        if bad[i] {
+            values[i] = beside(values, i).unwrap_or(last_good);
         } else {
-            beside(i).unwrap_or(last_good)
+            last_good = values[i];
         }
-    };
-    values.iter().enumerate().map(good).collect()
+    }
 }
 
 #[cfg(test)]
@@ -126,7 +125,8 @@ mod tests {
             values[range.clone()].fill(9999.0);
             bad[range].fill(true);
         }
-        let mended = substituted(&values, &bad, per_turn);
+        let mut mended = values;
+        substitute(&mut mended, &bad, per_turn);
         for (i, (a, b)) in mended.iter().zip(&truth).enumerate() {
             assert!((a - b).abs() < 2.0, "{i}: {a} {b}");
         }

@@ -14,7 +14,7 @@ use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
 use crate::cutting::measured::teeth::{
-    CERTAIN, idle_tooth, one_tooth_alone, tooth_back_mm, tooth_passing_too_weak,
+    CERTAIN, idle_tooth, one_tooth_alone, parts_of_turn, tooth_back_mm, tooth_passing_too_weak,
 };
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
@@ -39,6 +39,10 @@ const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow ent
 const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
      is as large as the feed per tooth, or [tool] teeth or spindle_rpm is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
      coefficients come out low by its share";
+const FEWER_PARTS: &str = "the forces come back several times per turn, but less often than the stated teeth pass, as a tool with fewer \
+     teeth makes them, or the stated teeth at a multiple of the stated speed: check [tool] teeth and spindle_rpm (and the feed per tooth \
+     that goes with them); averages cannot tell that, and coefficients are wrong by the same factor. Where both are right, the teeth \
+     alternate (tooth_radius_offset_mm or pitch_deg in [tool] take it into account)";
 /// Unevenness over that of one tooth cutting alone that no error of the directions explains (power).
 const MORE_THAN_ONE_TOOTH: f64 = 2.0;
 const TOOTH_STANDS_BACK: &str = "one tooth cuts less than the others and the next one more, as no offset of the tool's axis makes it: \
@@ -527,6 +531,23 @@ fn teeth_notice(
             }
         };
         notices.push(notice);
+        return;
+    }
+    if let Some(parts) = parts_of_turn(
+        milling.teeth,
+        [&orders[0], &orders[1]],
+        [&std[0], &std[1]],
+        zero_is_known,
+    ) {
+        notices.push(Notice {
+            kind: FEWER_PARTS,
+            detail: format!(
+                "{parts} times per turn of {} rpm: as {parts} teeth, or {} at {} rpm",
+                cut.spindle_rpm,
+                milling.teeth,
+                figures(cut.spindle_rpm * parts as f64, 4)
+            ),
+        });
         return;
     }
     let back = tooth_back_mm(

@@ -138,6 +138,39 @@ pub(crate) fn tooth_passing_too_weak(
     (told && measured.is_finite()).then_some(TwiceOverOnce { measured, at_most })
 }
 
+/// Power of all orders out of step with the parts of a turn, over that of the orders in step, below which the turn consists of such
+/// parts: no tool is mounted so well that nothing comes back once per turn while lines between that and the tooth passing do.
+const OUT_OF_STEP: f64 = 0.03;
+/// Where the zero is not known: times the power of any other order that the strongest one must have.
+const ABOVE_OTHERS: f64 = 2.0;
+
+/// Into how many alike parts the forces divide the turn, where those are more than one and fewer than the teeth: of a tool with
+/// fewer teeth, or at a multiple of the stated speed. An offset of the tool's axis, and a tooth that stands back, put most on
+/// the turn itself. `orders` of the forces in tool axes x and y from 1 on, N, and their `std`. Where the zero is known
+/// [`idle_tooth`] tells the former.
+pub(crate) fn parts_of_turn(
+    teeth: usize,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    zero_is_known: bool,
+) -> Option<usize> {
+    let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
+    let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
+    let count = orders.iter().map(|o| o.len()).min()?;
+    (2..teeth).rev().filter(|m| teeth.is_multiple_of(*m)).find(|m| {
+        let in_step = |k: &usize| k.is_multiple_of(*m) && !k.is_multiple_of(teeth);
+        let strongest = (1..=count).filter(in_step).map(power).fold(0.0, f64::max);
+        let is_certain = (1..=count)
+            .filter(in_step)
+            .any(|k| power(k) > CERTAIN * CERTAIN * noise(k));
+        let inside: f64 = (1..=count).filter(in_step).map(power).sum();
+        let outside: f64 = (1..=count).filter(|k| !k.is_multiple_of(*m)).map(power).sum();
+        let others = (1..=count).filter(|k| !in_step(k)).map(power).fold(0.0, f64::max);
+        let stands_out = !zero_is_known && strongest > ABOVE_OTHERS * others;
+        is_certain && (outside < OUT_OF_STEP * inside || stands_out)
+    })
+}
+
 /// A tooth that stands back by this part of the feed per tooth is worth a notice: from four teeth on, where an offset of the
 /// tool's axis is told apart from it, and below, where both look the same.
 const STANDS_BACK: f64 = 0.15;
@@ -244,6 +277,35 @@ mod tests {
             shape: None,
             places: Vec::new(),
         }
+    }
+
+    /// Two teeth told as four, at the right speed and at half of it, with runout; and four teeth with runout or one set back.
+    #[test]
+    fn a_turn_of_fewer_parts_than_teeth_is_told() {
+        let parts = |power: [f64; 8], zero_is_known: bool| {
+            let orders: Vec<Complex64> = power.iter().map(|p| Complex64::new(p.sqrt(), 0.0)).collect();
+            let nothing = vec![Complex64::ZERO; 8];
+            let std = vec![0.5; 8];
+            parts_of_turn(4, [&orders, &nothing], [&std, &std], zero_is_known)
+        };
+        let two_teeth = [3000.0, 21000.0, 140.0, 1900.0, 30.0, 1800.0, 40.0, 3300.0];
+        assert_eq!(parts(two_teeth, false), Some(2));
+        assert_eq!(parts(two_teeth, true), None);
+        let half_the_speed = [0.3, 3000.0, 0.2, 21000.0, 0.1, 140.0, 0.2, 1900.0];
+        assert_eq!(parts(half_the_speed, false), Some(2));
+        assert_eq!(parts(half_the_speed, true), Some(2));
+        let runout = [3000.0, 40.0, 300.0, 900.0, 10.0, 4.0, 10.0, 200.0];
+        assert_eq!(parts(runout, false), None);
+        let set_back = [2000.0, 700.0, 200.0, 900.0, 10.0, 40.0, 10.0, 200.0];
+        assert_eq!(parts(set_back, false), None);
+        let even = [0.3, 0.2, 0.3, 900.0, 0.2, 0.1, 0.2, 200.0];
+        assert_eq!(parts(even, false), None);
+        // Of a prime number of teeth there are no parts.
+        let orders = vec![Complex64::ONE; 6];
+        assert_eq!(
+            parts_of_turn(3, [&orders, &orders], [&[0.01; 6], &[0.01; 6]], false),
+            None
+        );
     }
 
     /// Forces of teeth that cut `share` each, edge forces where they cut at all; `zero`: an offset of the channels.

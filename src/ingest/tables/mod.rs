@@ -7,3 +7,4 @@ pub(crate) mod split_comma;
 pub(crate) mod stamps;
 pub(crate) mod table;
 pub(crate) mod table_rows;
+pub(crate) mod word_columns;

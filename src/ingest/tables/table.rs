@@ -274,10 +274,14 @@ impl Header {
                 if at_the_end && *rest == Rest::Blank {
                     notes.file("the last row is incomplete and left out");
                 } else if let (true, Rest::Footer(count)) = (at_the_end, rest) {
-                    notes.file(format!(
-                        "{count} lines below the last row, from {:?} on, are no rows and left out",
-                        text.trim_end().chars().take(20).collect::<String>().trim_end()
-                    ));
+                    let text = text.trim_end().chars().take(20).collect::<String>();
+                    let text = text.trim_end();
+                    notes.file(match count {
+                        1 => format!("1 line below the last row, {text:?}, is no row and left out"),
+                        _ => format!(
+                            "{count} lines below the last row, from {text:?} on, are no rows and left out"
+                        ),
+                    });
                     ends_in_a_row = false;
                 } else {
                     bad_row = Some(self.bad_row(text, line + part.lines));

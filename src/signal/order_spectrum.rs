@@ -474,7 +474,8 @@ mod tests {
         let zero = |i: usize| 0.01 * i as f64;
         let by = |longest| spectrum_by_pieces(&samples, zero, rate, per_turn, 40, longest).unwrap();
         let (whole, pieces) = (by(1 << 19), by(1 << 13));
-        assert_eq!(whole.rest.len(), 30_000);
+        // 436 revolutions are 59 863 samples.
+        assert_eq!(whole.rest.len(), 59_863 / 2 + 1);
         // 59 revolutions of 137.3 samples.
         assert_eq!(pieces.rest.len(), 8101 / 2 + 1);
         for (a, b) in whole.coefficient.iter().zip(&pieces.coefficient) {

@@ -263,8 +263,8 @@ fn from_taps(
         ));
     } else if units::parse_named(&hammer.file_unit).is_none_or(|u| u.dimension != Dimension::FORCE) {
         told.warnings.push(format!(
-            "{set}: {} is taken for the hammer; it counts in {}, not in newtons: frequencies and damping are right, the size of the \
-             FRFs and modal masses are not (with the hammer's sensitivity: give the values in N)",
+            "{set}: {} is taken for the hammer; it counts in {}, not in newtons: frequencies and damping do not depend on it, the size of the \
+             FRFs and modal masses do (with the hammer's sensitivity: give the values in N)",
             hammer.name, hammer.file_unit
         ));
     }

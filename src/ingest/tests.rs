@@ -478,6 +478,15 @@ fn exports_of_pulse() {
             .any(|w| w.contains("lines below the last row, from \"TagsBegin:\" on")),
         "{warnings:?}"
     );
+    // Without the sensor's sensitivity: volts for each newton.
+    let (_, contents, warnings) = read(bytes(export("Complex", "V/N", "Frequency Response", "Hz", &rows)));
+    assert_eq!(contents.frfs[0].quantity, None);
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("V/N counts in volts: not calibrated")),
+        "{warnings:?}"
+    );
     let cross = export("Complex", "(m/s²)N", "Cross-spectrum", "Hz", &rows);
     assert!(problem(bytes(cross)).contains("a PULSE export of Cross-spectrum over Hz"));
     let rows: String = (0..5)

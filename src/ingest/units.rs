@@ -118,6 +118,26 @@ pub fn parse(label: &str) -> Option<Unit> {
     (reader.at == characters.len() && unit.factor.is_finite() && unit.factor > 0.0).then_some(unit)
 }
 
+/// What to say of an FRF whose unit is understood and is none of a motion per force: volts (a sensor's sensitivity was not entered),
+/// or like per like (`/` is what Testlab writes there).
+pub fn no_motion_per_force(label: &str) -> Option<String> {
+    let (above, below) = label.trim().split_once('/')?;
+    let volts = |part: &str| parse(part).is_some_and(|u| u.dimension == Dimension::VOLTAGE);
+    if volts(above) || volts(below) {
+        return Some(format!(
+            "the unit {label} counts in volts: not calibrated, its size and its part of a shape are off by the sensor's \
+             sensitivity; frequencies and damping are not"
+        ));
+    }
+    let like = label.trim() == "/" || parse(label)?.dimension == Dimension::NONE;
+    like.then(|| {
+        format!(
+            "the unit {label} is a ratio of like quantities, not a motion per force: where both are motions \
+             (transmissibility), its resonances are those of the structure held at the reference, and it has no modal masses"
+        )
+    })
+}
+
 /// As [`parse`], and for labels that are names with a unit at their end: `acc_m_s2`, `acc_m/s2`, `force_n`; and for such an end
 /// alone: `mm_s2`.
 pub fn parse_named(label: &str) -> Option<Unit> {
@@ -351,6 +371,25 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
     use proptest::prelude::*;
+
+    #[test]
+    fn units_of_frfs_that_are_no_motion_per_force() {
+        let said = |label: &str| no_motion_per_force(label).unwrap_or_default();
+        // Volts per volt: two sensors without their sensitivities, as likely a hammer and a sensor as two motions.
+        for volts in ["V/N", "mV/N", "V/lbf", "V/V"] {
+            assert!(said(volts).contains("counts in volts"), "{volts}");
+        }
+        for ratio in ["/", "g/g", "(m/s²)/(m/s²)"] {
+            assert!(
+                said(ratio).contains("held at the reference"),
+                "{ratio}: {}",
+                said(ratio)
+            );
+        }
+        for fine in ["(m/s²)/N", "m/N", "g/lbf", "", "-", "1", "dB", "a.u./N"] {
+            assert_eq!(no_motion_per_force(fine), None, "{fine}");
+        }
+    }
 
     #[test]
     fn labels_seen_in_the_field() {

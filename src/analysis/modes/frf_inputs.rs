@@ -70,10 +70,13 @@ pub(crate) fn settle_unsaid(inputs: &mut [FrfInput], reading: &FrfReading, told:
                 *v /= Complex64::new(0.0, TAU * f).powi(order);
             }
         }
+        let its_frfs = match unsaid.names.len() {
+            1 => "FRF is".to_string(),
+            many => format!("{many} FRFs are"),
+        };
         told.warnings.push(format!(
-            "{}: the file does not say what its {} FRFs are; taken as {}{why} (another: --quantity)",
+            "{}: the file does not say which motion per force its {its_frfs}; taken as {}{why} (another: --quantity)",
             unsaid.file,
-            unsaid.names.len(),
             units::frf_unit(taken_as)
         ));
     }
@@ -207,10 +210,13 @@ fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quanti
         .collect()
 }
 
-/// The hammer's channel: the only one in newtons, or else the only one that is called so.
+/// The hammer's channel: the only one in newtons, or else the only one that is called so, or else the only one in volts beside
+/// channels of motion.
 fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
-    let in_newtons =
-        |c: &&Channel| units::parse_named(&c.file_unit).is_some_and(|u| u.dimension == Dimension::FORCE);
+    let dimension = |c: &Channel| units::parse_named(&c.file_unit).map(|u| u.dimension);
+    let in_newtons = |c: &&Channel| dimension(c) == Some(Dimension::FORCE);
+    let in_volts = |c: &&Channel| dimension(c) == Some(Dimension::VOLTAGE);
+    let moves = |c: &Channel| dimension(c).is_some_and(|d| d.motion().is_some());
     let called = |c: &&Channel| ingest::is_called_hammer(&c.name);
     let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
         record.channels.iter().filter(|c| test(c)).collect()
@@ -221,8 +227,12 @@ fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
         _ => {
             let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
             let both: Vec<&&Channel> = newtons.iter().filter(|c| called(c)).collect();
-            match both.as_slice() {
-                [one] => Ok(one),
+            let volts = by(&in_volts);
+            let else_motion = newtons.is_empty() && named.is_empty() && record.channels.len() > 1;
+            let else_motion = else_motion && record.channels.iter().filter(|c| !moves(c)).count() == 1;
+            match (both.as_slice(), volts.as_slice()) {
+                ([one], _) => Ok(one),
+                (_, [one]) if else_motion => Ok(one),
                 _ => Err(InputError::new(format!(
                     "a time record without exactly one hammer channel ({})",
                     names.join(", ")
@@ -250,6 +260,12 @@ fn from_taps(
         told.warnings.push(format!(
             "{set}: the hammer's channel {} has no unit: taken for newtons",
             hammer.name
+        ));
+    } else if units::parse_named(&hammer.file_unit).is_none_or(|u| u.dimension != Dimension::FORCE) {
+        told.warnings.push(format!(
+            "{set}: {} is taken for the hammer; it counts in {}, not in newtons: frequencies and damping do not depend on it, the size of the \
+             FRFs and modal masses do (with the hammer's sensitivity: give the values in N)",
+            hammer.name, hammer.file_unit
         ));
     }
     let mut sensors: Vec<(&Channel, Quantity)> = Vec::new();
@@ -451,6 +467,13 @@ mod tests {
         assert_eq!(count.unwrap(), 1);
         assert!(told.contains("force has no unit: taken for newtons"), "{told}");
         assert!(told.contains("Acc 1 has no unit: taken for m/s²"), "{told}");
+        // Volts: the hammer was not calibrated, and that is said, whether it is called so or is what is no motion.
+        for names in ["time,hammer [V],acc_m_per_s2", "time,CH8 [V],CH2 [cm/s2]"] {
+            let (count, told) = of(names);
+            assert_eq!(count.unwrap(), 1, "{names}");
+            assert!(told.contains("counts in V, not in newtons"), "{names}: {told}");
+        }
+        assert!(of("time,a [V],b [V]").0.is_err());
         let error = of("time,force,x").0.unwrap_err().to_string();
         assert!(
             error.contains("others: x") && error.contains("acc_m_per_s2"),

@@ -97,6 +97,34 @@ fn differentiations(channels: &[&Channel]) -> Vec<u8> {
     found.iter().map(|derivative| highest - derivative).collect()
 }
 
+/// The channel of one sensor's record that is at every sample the root of the sum of squares of the other two or three, as telephones
+/// write beside the directions ("absolute acceleration"): it rectifies, so its frequencies are none of the structure.
+fn total_of_the_others(channels: &[&Channel]) -> Option<usize> {
+    if !(3..=4).contains(&channels.len()) {
+        return None;
+    }
+    (0..channels.len()).find(|at| {
+        let total = &channels[*at].samples;
+        let others = || {
+            channels
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| k != at)
+                .map(|(_, c)| c)
+        };
+        let largest = total.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        // Two others at least move, or a channel would be the total of one beside a dead one.
+        let moving = others()
+            .filter(|c| c.samples.iter().any(|v| v.abs() > 0.01 * largest))
+            .count();
+        moving >= 2
+            && total.iter().enumerate().all(|(k, total)| {
+                let square: f64 = others().filter_map(|c| c.samples.get(k)).map(|v| v * v).sum();
+                (square.sqrt() - total).abs() <= 2e-3 * largest
+            })
+    })
+}
+
 /// Channels in a unit of motion; where none has one, all that are no force and no moment. A channel that rests is left
 /// out and named.
 fn responses<'a>(record: &'a TimeRecord, warnings: &mut Vec<String>) -> Vec<&'a Channel> {
@@ -126,6 +154,14 @@ fn responses<'a>(record: &'a TimeRecord, warnings: &mut Vec<String>) -> Vec<&'a 
     if !left.is_empty() {
         warnings.push(format!("no responses, left out: {}", left.join(", ")));
     }
+    if let Some(total) = total_of_the_others(&found) {
+        warnings.push(format!(
+            "channel {} is the size of the other {} together (root of the sum of squares), no motion along a direction: left out",
+            found[total].name,
+            found.len() - 1
+        ));
+        found.remove(total);
+    }
     found.retain(|c| {
         let moves = c.samples.windows(2).any(|w| w[0] != w[1]);
         if !moves {
@@ -134,4 +170,67 @@ fn responses<'a>(record: &'a TimeRecord, warnings: &mut Vec<String>) -> Vec<&'a 
         moves
     });
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel(name: &str, value: impl Fn(f64) -> f64) -> Channel {
+        Channel {
+            name: name.into(),
+            file_unit: "m/s^2".into(),
+            role: crate::data::ChannelRole::Other,
+            samples: (0..400).map(|k| value(f64::from(k))).collect(),
+        }
+    }
+
+    #[test]
+    fn a_total_beside_its_directions_is_no_response() {
+        let (x, y, z) = (
+            |k: f64| (0.3 * k).sin(),
+            |k: f64| (0.11 * k).cos(),
+            |k: f64| 9.81 + (0.7 * k).sin(),
+        );
+        let of = |channels: Vec<Channel>| {
+            let record = TimeRecord {
+                sample_rate_hz: 100.0,
+                start_s: 0.0,
+                channels,
+                filled: Vec::new(),
+            };
+            let mut warnings = Vec::new();
+            let names: Vec<String> = responses(&record, &mut warnings)
+                .iter()
+                .map(|c| c.name.clone())
+                .collect();
+            (names, warnings)
+        };
+        let total = move |k: f64| x(k).hypot(y(k)).hypot(z(k));
+        let (names, warnings) = of(vec![
+            channel("x", x),
+            channel("y", y),
+            channel("z", z),
+            channel("abs", total),
+        ]);
+        assert_eq!(names, ["x", "y", "z"]);
+        assert!(
+            warnings[0].contains("channel abs is the size of the other 3"),
+            "{warnings:?}"
+        );
+        // A sensor of its own, and one beside a dead channel, stay.
+        let (names, _) = of(vec![
+            channel("x", x),
+            channel("y", y),
+            channel("z", z),
+            channel("other", y),
+        ]);
+        assert_eq!(names.len(), 4);
+        let (names, _) = of(vec![
+            channel("z", z),
+            channel("same", z),
+            channel("dead", |_| 0.0),
+        ]);
+        assert_eq!(names, ["z", "same"]);
+    }
 }

@@ -491,10 +491,12 @@ pub(crate) fn read_table(
             (None, None) => dofs_of_header(header),
             both => both,
         };
-        let unit = part
-            .re
-            .or(part.magnitude.map(|(at, _)| at))
-            .and_then(|at| quantity_of_unit(header, at));
+        let value_column = part.re.or(part.magnitude.map(|(at, _)| at));
+        let unit = value_column.and_then(|at| quantity_of_unit(header, at));
+        let label = value_column.and_then(|at| unit_label(header, at));
+        if let Some(remark) = label.and_then(|label| units::no_motion_per_force(&label)) {
+            notes.about(&part.name, remark);
+        }
         let factor = unit.map_or(1.0, |u| u.1);
         if (factor - 1.0).abs() > 1e-12 {
             notes.about(&part.name, format!("converted to SI, factor {factor:.6}"));

@@ -85,6 +85,9 @@ pub(super) fn functions(
                 "Hz" if is_frf(&kind, &label, values) => {
                     let unit = units::parse(&label).and_then(|u| u.dimension.frf().zip(Some(u.factor)));
                     let factor = unit.filter(|_| !is_si).map_or(1.0, |(_, factor)| factor);
+                    if let Some(remark) = units::no_motion_per_force(&label) {
+                        notes.about(&column_name(c), remark);
+                    }
                     let (response, reference) = dof_names::both(&column_name(c)).unzip();
                     let record = FrfRecord {
                         name: column_name(c),
@@ -111,7 +114,7 @@ pub(super) fn functions(
         for (used, variable) in used.iter_mut().zip(variables) {
             *used |= variable.name.starts_with(&inside);
         }
-        if is_si && !label.is_empty() {
+        if is_si && units::parse(&label).is_some() {
             notes.about(
                 &name,
                 format!("saved by Testlab in MKS units: the numbers are SI, {label} is what Testlab shows"),
@@ -230,6 +233,12 @@ mod tests {
         assert_eq!(held.frfs[0].quantity, Some(Quantity::Accelerance));
         assert_eq!(held.frfs[0].frequency_hz[..2], [10.0, 12.0]);
         assert_eq!(held.frfs[0].value[0], Complex64::new(1.0, 2.0));
+        // Motion over motion: Testlab's label is a stroke.
+        let (re, im) = values();
+        let (held, told) = exported(["Hz", "/", "FRF"], [10.0, 2.0], re, im);
+        assert_eq!(held.frfs[0].quantity, None);
+        assert!(told.iter().any(|w| w.contains("transmissibility")), "{told:?}");
+        assert!(!told.iter().any(|w| w.contains("MKS")), "{told:?}");
         let (re, im) = values();
         let (held, _) = exported(["Hz", "g", "FrequencySpectrum"], [0.0, 2.0], re, im);
         assert_eq!((held.frfs.len(), held.others[0].kind), (0, "spectrum"));

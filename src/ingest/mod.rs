@@ -41,7 +41,7 @@ pub use long::{Survey, survey};
 pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
 pub use read::{TimeFile, read_file, read_frf_file, read_frfs, read_memory, read_time};
-pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer};
+pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer, is_called_marker};
 pub use text::shown;
 
 /// The first sheet of a workbook (xlsx) as tab separated text; `None` for all else.

@@ -228,11 +228,11 @@ fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
             let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
             let both: Vec<&&Channel> = newtons.iter().filter(|c| called(c)).collect();
             let volts = by(&in_volts);
-            let else_motion = newtons.is_empty() && named.is_empty() && record.channels.len() > 1;
-            let else_motion = else_motion && record.channels.iter().filter(|c| !moves(c)).count() == 1;
+            let none_said = newtons.is_empty() && named.is_empty() && record.channels.len() > 1;
+            let all_others_move = record.channels.iter().filter(|c| !moves(c)).count() == 1;
             match (both.as_slice(), volts.as_slice()) {
                 ([one], _) => Ok(one),
-                (_, [one]) if else_motion => Ok(one),
+                (_, [one]) if none_said && all_others_move && !ingest::is_called_marker(&one.name) => Ok(one),
                 _ => Err(InputError::new(format!(
                     "a time record without exactly one hammer channel ({})",
                     names.join(", ")
@@ -474,6 +474,7 @@ mod tests {
             assert!(told.contains("counts in V, not in newtons"), "{names}: {told}");
         }
         assert!(of("time,a [V],b [V]").0.is_err());
+        assert!(of("time,Tacho [V],CH2 [cm/s2]").0.is_err());
         let error = of("time,force,x").0.unwrap_err().to_string();
         assert!(
             error.contains("others: x") && error.contains("acc_m_per_s2"),

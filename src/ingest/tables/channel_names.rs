@@ -153,6 +153,16 @@ pub(crate) fn is_called_hammer(name: &str) -> bool {
         .any(|w| name.contains(w))
 }
 
+/// Is it called as a signal that marks turns or moments, in volts like an uncalibrated hammer?
+pub(crate) fn is_called_marker(name: &str) -> bool {
+    let name = name.to_lowercase();
+    [
+        "tach", "trig", "rpm", "speed", "drehzahl", "sync", "key", "puls", "clock", "encoder",
+    ]
+    .iter()
+    .any(|w| name.contains(w))
+}
+
 /// Is it called as an accelerometer is? `acc`, `Acc 1`, `tool_acceleration`.
 pub(crate) fn is_called_acceleration(name: &str) -> bool {
     words(name).iter().any(|w| w.starts_with("acc"))

@@ -8,7 +8,7 @@ use crate::cutting::ForceAxis;
 use crate::data::Process;
 use crate::identify::forces::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData};
-use crate::signal::median;
+use crate::signal::{from_mains_hz, median};
 
 /// What a line follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -171,8 +171,6 @@ struct Line {
 const NO_TEETH: usize = usize::MAX;
 /// An order this many times its noise (power) is no chance among some ten thousand.
 const STANDS_OUT: f64 = 16.0;
-/// Highest harmonic of the mains that is called so.
-const MAINS_HARMONICS: f64 = 12.0;
 /// Share of a frequency within which it is the same at another speed.
 const SAME_FREQUENCY: f64 = 0.005;
 /// Share of the speed by which cuts must differ to tell.
@@ -321,9 +319,7 @@ fn beside_orders(data: &CuttingData, index: usize, teeth: usize) -> Vec<Line> {
         let strongest = line.channels.iter().max_by(|a, b| a.1.total_cmp(&b.1));
         let in_air = strongest.is_some_and(|(_, own, air)| air.is_some_and(|air| air > 0.5 * own));
         let air_is_known = strongest.is_some_and(|c| c.2.is_some());
-        let is_mains = [50.0, 60.0].iter().any(|mains| {
-            hz < (MAINS_HARMONICS + 0.5) * mains && near(*mains, line.resolution_hz.clamp(0.3, 2.0))
-        });
+        let is_mains = from_mains_hz(hz) < line.resolution_hz.clamp(0.3, 2.0);
         let same = |other: &CutData| {
             let speed = other.spindle_rpm / cut.spindle_rpm - 1.0;
             speed.abs() > OTHER_SPEED

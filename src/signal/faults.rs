@@ -383,6 +383,8 @@ fn come_back_evenly(found: &[Range<usize>]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn the_least_of_the_highest_is_that_of_the_sorted_values() {
@@ -393,8 +395,6 @@ mod tests {
         }
         assert_eq!(highest([3.0; 40].into_iter(), 5), 3.0);
     }
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
 
     fn signal() -> Vec<f64> {
         let mut random = ChaCha8Rng::seed_from_u64(3);

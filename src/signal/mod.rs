@@ -8,6 +8,7 @@ mod engagement;
 mod faults;
 pub mod frf_noise;
 mod local_rational;
+mod mains;
 pub mod noise_law;
 mod order_spectrum;
 mod spindle_track;
@@ -20,6 +21,7 @@ pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub(crate) use faults::least_and_greatest;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
+pub use mains::{MAINS_HZ, from_mains_hz};
 pub use order_spectrum::{
     OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum, order_spectrum_above,
 };

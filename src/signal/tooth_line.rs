@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use realfft::{RealFftPlanner, RealToComplex};
 
 use super::blocks::median;
+use super::mains::MAINS_HZ;
 
 /// What the spectrum of a steady cut says about the spindle speed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -37,8 +38,6 @@ const FUNDAMENTAL: f64 = 0.3;
 const NOMINAL: f64 = 0.005;
 /// The frequency of a line is good to this part of the spectrum's resolution.
 const PLACED: f64 = 0.5;
-/// Mains hum and its first odd harmonic are no tooth.
-const MAINS_HZ: [f64; 4] = [50.0, 60.0, 150.0, 180.0];
 
 /// Looks for lines in the Hann-windowed amplitude spectra of the `channels` of one steady cut, all together (drift compensated, or
 /// not: a line is taken out). All together, because one direction may show twice the tooth passing more strongly than itself.
@@ -88,16 +87,18 @@ pub fn tooth_line(
             .map(|i| amplitude[i])
             .fold(0.0, f64::max)
     };
+    // Mains hum and its first odd harmonic are no tooth.
+    let off_mains = |hz: f64| {
+        let mut loud = MAINS_HZ.iter().flat_map(|mains| [*mains, 3.0 * mains]);
+        loud.all(|loud| (loud - hz).abs() > 4.0 * resolution_hz)
+    };
     // Below half a turn there is only drift.
     let first = (0.5 * spindle_hz / resolution_hz).ceil() as usize;
     let (at, strongest) = amplitude
         .iter()
         .enumerate()
         .skip(first)
-        .filter(|(i, _)| {
-            let hz = *i as f64 * resolution_hz;
-            MAINS_HZ.iter().all(|m| (m - hz).abs() > 4.0 * resolution_hz)
-        })
+        .filter(|(i, _)| off_mains(*i as f64 * resolution_hz))
         .max_by(|a, b| a.1.total_cmp(b.1))?;
     let strongest_hz = (at as f64 + peak_shift(&amplitude, at)) * resolution_hz;
     // A line that the strongest and its own turn put there says nothing of the stated turn. (2.5 turns are off its comb, and their
@@ -110,7 +111,7 @@ pub fn tooth_line(
     let nominal = (1..=teeth.max(1))
         .chain([2 * teeth.max(1)])
         .map(|k| k as f64 * spindle_hz)
-        .filter(|hz| MAINS_HZ.iter().all(|m| (m - hz).abs() > 4.0 * resolution_hz))
+        .filter(|hz| off_mains(*hz))
         .filter(|hz| !own_turn_hz.is_some_and(|turn_hz| is_multiple(*hz, turn_hz)))
         .map(own_peak)
         .fold(0.0, f64::max);

@@ -210,40 +210,44 @@ fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quanti
         .collect()
 }
 
-/// The hammer's channel: the only one in newtons, or else the only one that is called so, or else the only one in volts beside
-/// channels of motion.
+/// What a channel's unit measures, where it has one that is known.
+fn dimension(channel: &Channel) -> Option<Dimension> {
+    units::parse_named(&channel.file_unit).map(|u| u.dimension)
+}
+
+/// The hammer's channel: the only one in newtons, or else the only one that is called so, or else the only one that is no motion, if
+/// it is in volts.
 fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
-    let dimension = |c: &Channel| units::parse_named(&c.file_unit).map(|u| u.dimension);
-    let in_newtons = |c: &&Channel| dimension(c) == Some(Dimension::FORCE);
-    let in_volts = |c: &&Channel| dimension(c) == Some(Dimension::VOLTAGE);
-    let moves = |c: &Channel| dimension(c).is_some_and(|d| d.motion().is_some());
-    let called = |c: &&Channel| ingest::is_called_hammer(&c.name);
-    let by = |test: &dyn Fn(&&Channel) -> bool| -> Vec<&'a Channel> {
+    let by = |test: &dyn Fn(&Channel) -> bool| -> Vec<&'a Channel> {
         record.channels.iter().filter(|c| test(c)).collect()
     };
-    let (newtons, named) = (by(&in_newtons), by(&called));
-    match (newtons.as_slice(), named.as_slice()) {
-        ([one], _) | ([], [one]) => Ok(one),
+    let called = |c: &Channel| ingest::is_called_hammer(&c.name);
+    let newtons = by(&|c| dimension(c) == Some(Dimension::FORCE));
+    let likely = match newtons.len() {
+        0 => by(&called),
+        1 => newtons,
+        _ => newtons.into_iter().filter(|c| called(c)).collect(),
+    };
+    if let [one] = likely.as_slice() {
+        return Ok(one);
+    }
+    let others = by(&|c| dimension(c).and_then(|d| d.motion()).is_none());
+    let in_volts =
+        |c: &Channel| dimension(c) == Some(Dimension::VOLTAGE) && !ingest::is_called_marker(&c.name);
+    match others.as_slice() {
+        [one] if record.channels.len() > 1 && in_volts(one) => Ok(one),
         _ => {
             let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
-            let both: Vec<&&Channel> = newtons.iter().filter(|c| called(c)).collect();
-            let volts = by(&in_volts);
-            let none_said = newtons.is_empty() && named.is_empty() && record.channels.len() > 1;
-            let all_others_move = record.channels.iter().filter(|c| !moves(c)).count() == 1;
-            match (both.as_slice(), volts.as_slice()) {
-                ([one], _) => Ok(one),
-                (_, [one]) if none_said && all_others_move && !ingest::is_called_marker(&one.name) => Ok(one),
-                _ => Err(InputError::new(format!(
-                    "a time record without exactly one hammer channel ({})",
-                    names.join(", ")
-                ))
-                .file(path)
-                .remedy(
-                    "give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`, motion without any \
-                     force (idling, cutting) to `lobestone modal --output-only`",
-                )
-                .into()),
-            }
+            Err(InputError::new(format!(
+                "a time record without exactly one hammer channel ({})",
+                names.join(", ")
+            ))
+            .file(path)
+            .remedy(
+                "give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`, motion without any \
+                 force (idling, cutting) to `lobestone modal --output-only`",
+            )
+            .into())
         }
     }
 }
@@ -261,7 +265,7 @@ fn from_taps(
             "{set}: the hammer's channel {} has no unit: taken for newtons",
             hammer.name
         ));
-    } else if units::parse_named(&hammer.file_unit).is_none_or(|u| u.dimension != Dimension::FORCE) {
+    } else if dimension(hammer) != Some(Dimension::FORCE) {
         told.warnings.push(format!(
             "{set}: {} is taken for the hammer; it counts in {}, not in newtons: frequencies and damping do not depend on it, the size of the \
              FRFs and modal masses do (with the hammer's sensitivity: give the values in N)",

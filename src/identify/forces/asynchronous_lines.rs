@@ -1,6 +1,6 @@
 //! Lines of a steady cut that belong to no order of the spindle: vibration of the tool against the workpiece.
 
-use crate::signal::{OrderSpectrum, line_amplitude, median};
+use crate::signal::{OrderSpectrum, from_mains_hz, line_amplitude, median};
 
 /// What one cut shows off the comb.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,11 +40,7 @@ pub const MOST_SHIFT: i64 = 2;
 const OVER_AIR: f64 = 4.0;
 /// The same of mains hum, which grows with the current of the drives under load.
 const MAINS_OVER_AIR: f64 = 20.0;
-/// Hz.
-const MAINS_HZ: [f64; 2] = [50.0, 60.0];
-/// Highest multiple of it that is looked for: rectifiers make those of six and twelve.
-const MOST_MAINS: f64 = 12.0;
-/// Part of it that large grids keep it to.
+/// Part of its frequency that large grids keep it to.
 const MAINS_KEPT: f64 = 0.001;
 /// Lines further apart than this, Hz, do not tell hum from anything.
 const MAINS_TOLD: f64 = 3.0;
@@ -138,12 +134,7 @@ fn in_air(air: &[f64], sample_rate_hz: f64, hz: f64, line_hz: f64) -> f64 {
 
 /// Is this a multiple of a mains frequency, as nearly as the spectrum tells (its lines lie `line_hz` apart)?
 fn mains_beside(hz: f64, line_hz: f64) -> bool {
-    let near = |mains: &f64| {
-        let multiple = (hz / mains).round();
-        let width = 0.5 * line_hz + MAINS_KEPT * hz;
-        (1.0..=MOST_MAINS).contains(&multiple) && (hz - multiple * mains).abs() < width
-    };
-    line_hz < MAINS_TOLD && MAINS_HZ.iter().any(near)
+    line_hz < MAINS_TOLD && from_mains_hz(hz) < 0.5 * line_hz + MAINS_KEPT * hz
 }
 
 /// A line of a steady cut that stands above its surroundings.

@@ -16,7 +16,7 @@ use crate::identify::forces::asynchronous_lines::{
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
 use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
-use crate::signal::{highest_order, line_amplitude, order_spectrum_above};
+use crate::signal::{MAINS_HZ, highest_order, line_amplitude, order_spectrum_above};
 use crate::{Error, InputError, Result};
 
 /// What was cut.
@@ -319,7 +319,6 @@ pub struct CuttingData {
 /// Orders kept for each tooth, and in all.
 const ORDERS_PER_TOOTH: usize = 24;
 const MOST_ORDERS: usize = 96;
-const MAINS_HZ: [f64; 2] = [50.0, 60.0];
 
 /// The processes of `cuts`, the one with more cuts first.
 pub fn processes(cuts: &[Cut]) -> Vec<Process> {

@@ -1,5 +1,6 @@
 //! Tables that have columns of words beside their numbers: the state of a machine, a label, a remark.
 
+use crate::ingest::tables::number;
 use crate::ingest::text::{self, Lines};
 
 /// Rows that a table has at least.
@@ -10,8 +11,8 @@ const MOST_LINES_ABOVE: usize = 200;
 /// The text without the columns that hold no number in any row, and what is to be told of them; `None` where there is no such table,
 /// or where a column holds now a number, now words: that is a fault, and no reason to leave the column out.
 pub(crate) fn without_words(bytes: &[u8]) -> Option<(Vec<u8>, String)> {
+    let lines: Vec<&[u8]> = Lines::new(bytes).collect();
     [b'\t', b';', b','].into_iter().find_map(|delimiter| {
-        let lines: Vec<&[u8]> = Lines::new(bytes).collect();
         let names_at = names_line(&lines, delimiter)?;
         without_words_by(&lines, names_at, delimiter)
     })
@@ -22,10 +23,8 @@ fn fields(line: &[u8], delimiter: u8) -> impl Iterator<Item = &[u8]> {
 }
 
 fn is_number(field: &[u8], delimiter: u8) -> bool {
-    let Ok(text) = std::str::from_utf8(field) else {
-        return false;
-    };
-    text.parse::<f64>().is_ok() || delimiter != b',' && text.replace(',', ".").parse::<f64>().is_ok()
+    let is = |decimal| number::field(field, decimal).is_some();
+    is(b'.') || delimiter != b',' && is(b',')
 }
 
 /// The line of names: as many fields as each of the rows below it, none of them a number.

@@ -4,25 +4,30 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::side_by_side::{LANES, Lanes, dots};
+use super::side_by_side::{LANES, Lanes, dots, real_dots};
+use super::symmetric::Symmetric;
 use crate::robot::chain::System;
 
-/// Derivatives of the basis' matrices: entry (i, j) of parameter p's matrix stands at i + n (j + n p). They are symmetric.
+/// Derivatives of the basis' matrices.
 #[derive(Debug, Clone)]
 pub(super) struct Derivatives {
     n: usize,
     outputs: usize,
-    /// Whether a parameter changes any of the matrices.
-    acts: Vec<bool>,
-    stiffness: Vec<f64>,
-    /// Empty where no parameter changes the mass.
-    mass: Vec<f64>,
-    damping: Vec<f64>,
-    /// Empty where no parameter changes what is hysteretic.
-    hysteretic: Vec<f64>,
+    parameters: Vec<MatrixSlopes>,
     massless: Option<MasslessDerivatives>,
     /// Of parameters that move the outputs themselves.
     moved_outputs: Vec<MovedOutputs>,
+}
+
+/// What one parameter changes in the matrices.
+#[derive(Debug, Clone)]
+struct MatrixSlopes {
+    /// Anything at all.
+    acts: bool,
+    stiffness: Symmetric,
+    damping: Symmetric,
+    mass: Symmetric,
+    hysteretic: Symmetric,
 }
 
 /// What one parameter changes in the outputs' rows.
@@ -110,17 +115,14 @@ impl Projection<'_> {
             Some(matrix) => basis.transpose() * matrix * *basis,
             None => DMatrix::zeros(n, n),
         };
-        let changes_mass = all.iter().any(|d| d.mass.is_some());
-        let changes_hysteresis = all.iter().any(|d| d.hysteretic.is_some());
-        let room = |wanted: bool| Vec::with_capacity(if wanted { n * n * count } else { 0 });
+        let changed = |matrix: &Option<DMatrix<f64>>| match matrix {
+            Some(_) => Symmetric::of(&project(matrix)),
+            None => Symmetric::Squares(Vec::new()),
+        };
         let mut derivatives = Derivatives {
             n,
             outputs,
-            acts: Vec::with_capacity(count),
-            stiffness: room(true),
-            mass: room(changes_mass),
-            damping: room(true),
-            hysteretic: room(changes_hysteresis),
+            parameters: Vec::with_capacity(count),
             massless: (still.ncols() > 0 && count > 0).then(|| MasslessDerivatives {
                 stiffness: vec![0.0; n * count * outputs],
                 own: vec![0.0; outputs * count * outputs],
@@ -154,21 +156,19 @@ impl Projection<'_> {
                 &derivative.viscous,
                 &derivative.hysteretic,
             ];
-            derivatives
-                .acts
-                .push(zeta_slope != 0.0 || anything.iter().any(|m| m.is_some()));
-            derivatives.stiffness.extend_from_slice(stiffness.as_slice());
-            derivatives.damping.extend_from_slice(damping.as_slice());
-            if changes_mass {
-                derivatives
-                    .mass
-                    .extend_from_slice(project(&derivative.mass).as_slice());
-            }
-            if changes_hysteresis {
-                derivatives
-                    .hysteretic
-                    .extend_from_slice(project(&derivative.hysteretic).as_slice());
-            }
+            let modal = zeta_slope != 0.0
+                || (zeta != 0.0 && (derivative.stiffness.is_some() || chain_mass.is_some()));
+            derivatives.parameters.push(MatrixSlopes {
+                acts: zeta_slope != 0.0 || anything.iter().any(|m| m.is_some()),
+                stiffness: Symmetric::of(&stiffness),
+                // Modal damping is no sum of few squares.
+                damping: match modal {
+                    true => Symmetric::full(&damping),
+                    false => Symmetric::of(&damping),
+                },
+                mass: changed(&derivative.mass),
+                hysteretic: changed(&derivative.hysteretic),
+            });
             let at = n * outputs * p;
             if let (Some(massless), Some(dm)) = (&mut derivatives.massless, &derivative.mass) {
                 let reach = dm * *still * *still_rows;
@@ -215,8 +215,12 @@ pub struct Slopes {
     /// [input + inputs · (out + outputs · parameter)]
     values: Vec<Lanes>,
     outputs: usize,
-    dynamic: Vec<Lanes>,
+    /// n
+    coupling: Vec<Lanes>,
+    /// n × inputs
     product: Vec<Lanes>,
+    /// One an output.
+    along: Vec<Lanes>,
 }
 
 impl Slopes {
@@ -244,11 +248,12 @@ impl Derivatives {
     pub(super) fn at(&self, rates: [Complex64; LANES], columns: &[Lanes], slopes: &mut Slopes) {
         slopes.outputs = self.outputs;
         let room = [
-            (&mut slopes.dynamic, self.n),
+            (&mut slopes.coupling, self.n),
             (&mut slopes.product, self.n * slopes.inputs.len()),
+            (&mut slopes.along, self.outputs),
             (
                 &mut slopes.values,
-                self.acts.len() * self.outputs * slopes.inputs.len(),
+                self.parameters.len() * self.outputs * slopes.inputs.len(),
             ),
         ];
         for (vector, size) in room {
@@ -292,46 +297,71 @@ impl WithSimd for AtRates<'_> {
         let Derivatives {
             n,
             outputs,
-            acts,
-            stiffness,
-            mass,
-            damping,
-            hysteretic,
+            parameters,
             massless,
             moved_outputs,
         } = derivatives;
         let (n, outputs, inputs) = (*n, *outputs, slopes.inputs.len());
         let Slopes {
-            dynamic,
+            coupling: dynamic,
             product,
+            along,
             values,
             inputs: forces,
             ..
         } = slopes;
         let of_output = |out: usize| &columns[n * out..n * (out + 1)];
-        for p in (0..acts.len()).filter(|p| acts[*p]) {
-            for j in 0..n {
-                let at = n * (j + n * p)..n * (j + n * p + 1);
-                let stiff_and_damped = stiffness[at.clone()].iter().zip(&damping[at.clone()]);
-                for (z, (k, c)) in dynamic.iter_mut().zip(stiff_and_damped) {
-                    *z = rate.times(*c).plus(*k);
-                }
-                if !mass.is_empty() {
-                    for (z, m) in dynamic.iter_mut().zip(&mass[at.clone()]) {
-                        *z += square.times(*m);
+        let one = Lanes::splat(1.0);
+        let i = Lanes::of([Complex64::I; LANES]);
+        for (p, parameter) in parameters.iter().enumerate().filter(|(_, p)| p.acts) {
+            let matrices = [
+                (&parameter.stiffness, one),
+                (&parameter.damping, rate),
+                (&parameter.mass, square),
+                (&parameter.hysteretic, i),
+            ];
+            let is_full = |(matrix, _): &(&Symmetric, Lanes)| matches!(matrix, Symmetric::Full { .. });
+            let with_product = massless.is_some() || matrices.iter().any(is_full);
+            if with_product {
+                product.fill(Lanes::default());
+            }
+            for (matrix, factor) in matrices {
+                match matrix {
+                    Symmetric::Squares(squares) => {
+                        for (sign, v) in squares {
+                            for first in (0..outputs).step_by(3) {
+                                let [sums] = real_dots(simd, [v], three(of_output, first, outputs));
+                                along[first..].iter_mut().zip(sums).for_each(|(a, s)| *a = s);
+                            }
+                            let factor = factor.times(*sign);
+                            for out in 0..outputs {
+                                let own = &mut values[inputs * (out + outputs * p)..][..inputs];
+                                let scaled = factor * along[out];
+                                for (value, input) in own.iter_mut().zip(forces.iter()) {
+                                    *value -= scaled * along[*input];
+                                }
+                            }
+                        }
+                    }
+                    Symmetric::Full { size, entries } => {
+                        for j in (0..*size).step_by(2) {
+                            let columns = [j, (j + 1).min(size - 1)];
+                            let of = columns.map(|j| &entries[size * j..size * (j + 1)]);
+                            for first in (0..inputs).step_by(3) {
+                                let sums =
+                                    real_dots(simd, of, three(|c| of_output(forces[c]), first, inputs));
+                                for (j, sums) in (j..*size).zip(sums) {
+                                    for (c, sum) in (first..inputs).zip(sums) {
+                                        product[n * c + j] += factor * sum;
+                                    }
+                                }
+                            }
+                        }
                     }
                 }
-                if !hysteretic.is_empty() {
-                    for (z, h) in dynamic.iter_mut().zip(&hysteretic[at]) {
-                        z.im.iter_mut().for_each(|im| *im += h);
-                    }
-                }
-                for first in (0..inputs).step_by(3) {
-                    let sums = dots(simd, dynamic, three(|c| of_output(forces[c]), first, inputs));
-                    for (c, sum) in (first..inputs).zip(sums) {
-                        product[n * c + j] = sum;
-                    }
-                }
+            }
+            if !with_product {
+                continue;
             }
             // Coupling of an output's massless part with the moving coordinates.
             let coupling = |massless: &MasslessDerivatives, out: usize, z: &mut [Lanes]| {

@@ -9,9 +9,11 @@ mod derivatives;
 mod dynamic_stiffness;
 mod modal_basis;
 mod side_by_side;
+mod symmetric;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
+use pulp::{Arch, Simd, WithSimd};
 
 use super::chain::System;
 use crate::{Error, Result};
@@ -19,7 +21,7 @@ use derivatives::Derivatives;
 pub use derivatives::{RowSlopes, Slopes};
 use dynamic_stiffness::{DynamicStiffness, Modes, Room};
 pub use modal_basis::{ModalBasis, natural_frequencies_hz};
-use side_by_side::{LANES, Lanes};
+use side_by_side::{LANES, Lanes, real_dots};
 
 /// A system in its modal basis, ready to give receptances between chosen outputs at any frequency.
 #[derive(Debug, Clone)]
@@ -35,12 +37,13 @@ pub struct FrfBasis {
     derivatives: Derivatives,
 }
 
-/// Responses to forces along outputs at one frequency: Z⁻¹ rᵀ in the basis, n a force, column by column.
+/// Receptances at one frequency for forces along some of the outputs.
 #[derive(Debug, Clone, Default)]
 pub struct Response {
     omega: f64,
-    columns: Vec<Complex64>,
-    /// Which column belongs to the force along an output.
+    /// m/N; all outputs, force by force.
+    receptances: Vec<Complex64>,
+    /// Which of the forces acts along an output.
     place: Vec<Option<usize>>,
 }
 
@@ -49,22 +52,18 @@ impl Response {
     pub fn omega(&self) -> f64 {
         self.omega
     }
-
-    /// Of the force along output `input`, which must have been solved for.
-    fn column(&self, n: usize, input: usize) -> &[Complex64] {
-        let place = self.place[input].expect("a force that was solved for");
-        &self.columns[n * place..n * (place + 1)]
-    }
 }
 
 /// Lines solved side by side, with the room to work them out again for the next.
 #[derive(Default)]
 struct SideBySide {
-    /// As those of [`Response`].
+    /// Responses to the forces: Z⁻¹ rᵀ in the basis, n a force.
     columns: Vec<Lanes>,
     room: Room,
-    /// Where the forces that are shown stand among the columns.
-    shown: Vec<usize>,
+    /// The forces that are shown: where they stand among the columns, and the output they act along.
+    shown: Vec<(usize, usize)>,
+    /// As those of [`Response`].
+    receptances: Vec<Lanes>,
     /// One of the lines.
     response: Response,
 }
@@ -76,20 +75,57 @@ impl SideBySide {
         room.response.place.resize(outputs, None);
         for output in shown {
             room.response.place[*output] = Some(room.shown.len());
-            room.shown.extend(solved.iter().position(|s| s == output));
+            let column = solved.iter().position(|s| s == output);
+            room.shown.extend(column.map(|column| (column, *output)));
         }
         room
     }
 
-    /// The line `lane`, which was solved at `rate`; `n` numbers a force.
-    fn line(&mut self, n: usize, lane: usize, rate: &Complex64) -> &Response {
+    /// The line `lane`, which was solved at `rate`.
+    fn line(&mut self, lane: usize, rate: &Complex64) -> &Response {
         self.response.omega = rate.im;
-        self.response.columns.clear();
-        for place in &self.shown {
-            let column = &self.columns[n * place..n * (place + 1)];
-            self.response.columns.extend(column.iter().map(|x| x.get(lane)));
-        }
+        self.response.receptances.clear();
+        let all = self.receptances.iter().map(|h| h.get(lane));
+        self.response.receptances.extend(all);
         &self.response
+    }
+}
+
+/// The receptances of lines that were solved.
+struct Receptances<'a> {
+    basis: &'a FrfBasis,
+    room: &'a mut SideBySide,
+}
+
+impl WithSimd for Receptances<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (basis, n, outputs) = (self.basis, self.basis.n, self.basis.output_count());
+        let SideBySide {
+            columns,
+            shown,
+            receptances,
+            ..
+        } = self.room;
+        receptances.clear();
+        receptances.resize(outputs * shown.len(), Lanes::default());
+        for first in (0..shown.len()).step_by(3) {
+            let three: [&[Lanes]; 3] = std::array::from_fn(|k| {
+                let (column, _) = shown[(first + k).min(shown.len() - 1)];
+                &columns[n * column..n * (column + 1)]
+            });
+            for out in (0..outputs).step_by(2) {
+                let rows = [out, (out + 1).min(outputs - 1)].map(|out| basis.row(out));
+                for (out, sums) in (out..outputs).zip(real_dots(simd, rows, three)) {
+                    for ((c, sum), (_, input)) in (first..).zip(sums).zip(&shown[first..]) {
+                        let massless = basis.massless.as_ref().map_or(0.0, |m| m[(out, *input)]);
+                        receptances[out + outputs * c] = sum.plus(massless);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -242,11 +278,22 @@ impl FrfBasis {
         let outputs = self.outputs();
         let columns = self.solved_at(rate, &outputs);
         finite(columns.iter().copied(), rate)?;
+        let mut receptances = Vec::with_capacity(outputs.len().pow(2));
+        for input in &outputs {
+            let column = &columns[self.n * input..self.n * (input + 1)];
+            receptances.extend(outputs.iter().map(|out| self.of_column(*out, *input, column)));
+        }
         Ok(Response {
             omega,
-            columns,
+            receptances,
             place: outputs.into_iter().map(Some).collect(),
         })
+    }
+
+    /// Receptance of output `out`, `column` being the response to the force along output `input`.
+    fn of_column(&self, out: usize, input: usize, column: &[Complex64]) -> Complex64 {
+        let moving: Complex64 = self.row(out).iter().zip(column).map(|(r, u)| u * *r).sum();
+        moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
     }
 
     /// Solves line after line for forces along the outputs `inputs` that grow like exp(st), s being `rates` (rad/s), and shows
@@ -264,7 +311,7 @@ impl FrfBasis {
         for (group, rates) in rates.chunks(LANES).enumerate() {
             self.solve_group(rates, inputs, &mut room)?;
             for (lane, rate) in rates.iter().enumerate() {
-                visit(LANES * group + lane, room.line(self.n, lane, rate))?;
+                visit(LANES * group + lane, room.line(lane, rate))?;
             }
         }
         Ok(())
@@ -288,7 +335,7 @@ impl FrfBasis {
             self.derivatives.at(filled(rates), &room.columns, &mut slopes);
             for (lane, rate) in rates.iter().enumerate() {
                 slopes.lane = lane;
-                visit(LANES * group + lane, room.line(self.n, lane, rate), &slopes)?;
+                visit(LANES * group + lane, room.line(lane, rate), &slopes)?;
             }
         }
         Ok(())
@@ -313,29 +360,18 @@ impl FrfBasis {
         for (lane, rate) in rates.iter().enumerate() {
             finite(room.columns.iter().map(|x| x.get(lane)), *rate)?;
         }
+        Arch::new().dispatch(Receptances { basis: self, room });
         Ok(())
     }
 
     /// Receptance of output `out` per force along output `input`, m/N, at the frequency last solved; for one of the two it must
     /// have been solved (Maxwell 1864: the matrices are symmetric).
     pub fn receptance(&self, response: &Response, out: usize, input: usize) -> Complex64 {
-        let (force, seen) = if response.place[input].is_some() {
-            (input, out)
-        } else {
-            (out, input)
+        let (force, seen) = match response.place[input] {
+            Some(force) => (force, out),
+            None => (response.place[out].expect("a force that was solved for"), input),
         };
-        let column = response.column(self.n, force);
-        let row = self.row(seen);
-        // Two sums, so that additions need not wait for each other.
-        let (rows, columns) = (row.chunks_exact(2), column.chunks_exact(2));
-        let rest = rows.remainder().iter().zip(columns.remainder());
-        let mut sums: [Complex64; 2] = [rest.map(|(r, u)| u * *r).sum(), Complex64::ZERO];
-        for (r, u) in rows.zip(columns) {
-            sums[0] += u[0] * r[0];
-            sums[1] += u[1] * r[1];
-        }
-        let moving = sums[0] + sums[1];
-        moving + self.massless.as_ref().map_or(0.0, |m| m[(out, input)])
+        response.receptances[seen + self.output_count() * force]
     }
 
     /// Receptance at `omega` in one call, m/N.

@@ -199,6 +199,46 @@ pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3
     sums
 }
 
+/// Σ aᵢ bᵢ of each of the real vectors a with each of three vectors b.
+#[inline(always)]
+pub(super) fn real_dots<S: Simd, const R: usize>(
+    simd: S,
+    a: [&[f64]; R],
+    b: [&[Lanes]; 3],
+) -> [[Lanes; 3]; R] {
+    let n = a.first().map_or(0, |a| a.len());
+    let (a, b) = (a.map(|a| &a[..n]), b.map(|b| &b[..n]));
+    let mut sums = [[Lanes::default(); 3]; R];
+    if S::F64_LANES != LANES {
+        for (sums, a) in sums.iter_mut().zip(a) {
+            for (sum, b) in sums.iter_mut().zip(b) {
+                a.iter().zip(b).for_each(|(a, b)| *sum += b.times(*a));
+            }
+        }
+        return sums;
+    }
+    // By hand: the compiler keeps these sums in memory.
+    let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[0];
+    let (mut re, mut im) = ([[simd.splat_f64s(0.0); 3]; R], [[simd.splat_f64s(0.0); 3]; R]);
+    for i in 0..n {
+        let factors = a.map(|a| simd.splat_f64s(a[i]));
+        for k in 0..3 {
+            let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
+            for r in 0..R {
+                re[r][k] = simd.mul_add_e_f64s(factors[r], b_re, re[r][k]);
+                im[r][k] = simd.mul_add_e_f64s(factors[r], b_im, im[r][k]);
+            }
+        }
+    }
+    for r in 0..R {
+        for k in 0..3 {
+            S::as_mut_simd_f64s(&mut sums[r][k].re).0[0] = re[r][k];
+            S::as_mut_simd_f64s(&mut sums[r][k].im).0[0] = im[r][k];
+        }
+    }
+    sums
+}
+
 impl SubAssign for Lanes {
     #[inline(always)]
     fn sub_assign(&mut self, other: Lanes) {

@@ -99,11 +99,13 @@ pub fn survey(path: &Path) -> Result<Survey> {
     };
     let mut check: Option<QualityCheck> = None;
     let (mut first, mut rows) = (None, 0);
-    while let Some(mut piece) = long.next_piece()? {
+    let mut next = long.next_piece()?;
+    while let Some(mut piece) = next {
         let expected = long.expected_samples();
-        check
-            .get_or_insert_with(|| QualityCheck::for_length(expected))
-            .add(&piece);
+        let check = check.get_or_insert_with(|| QualityCheck::for_length(expected));
+        // A piece is looked at while the one behind it is read.
+        let (_, read) = rayon::join(|| check.add(&piece), || long.next_piece());
+        next = read?;
         rows += piece.len();
         let samples = piece.channels.iter_mut().map(|c| std::mem::take(&mut c.samples));
         long.pieces.spare.extend(samples);

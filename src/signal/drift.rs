@@ -81,6 +81,8 @@ impl DriftLine {
 
 /// Samples further than this many robust standard deviations from the line are spikes.
 const SPIKE_SIGMA: f64 = 6.0;
+/// Samples that tell the scatter of the air: of more only every n-th is looked at.
+const ENOUGH_FOR_SCATTER: usize = 1 << 17;
 /// Blocks that each air segment is cut into to see how far its noise is from white.
 const BLOCKS_PER_SEGMENT: usize = 8;
 /// Scatter of block means over that of white noise from which on the air is called bent: chance stays below
@@ -106,28 +108,29 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
         step: 0.0,
     };
     let time = |i: usize| start_s + i as f64 / sample_rate_hz;
-    let mut kept: Vec<usize> = air
+    let mut kept: Vec<Range<usize>> = air
         .ranges()
-        .flat_map(|r| r.clone())
-        .filter(|&i| i < samples.len())
+        .map(|r| r.start.min(samples.len())..r.end.min(samples.len()))
         .collect();
-    if kept.len() < 2 {
+    if count(&kept) < 2 {
         return drift;
     }
     // Least squares, dropping spikes, until nothing more is dropped.
     for _ in 0..5 {
-        let (offset, slope, reference) =
-            line(kept.iter().map(|&i| time(i)), kept.iter().map(|&i| samples[i]));
+        let before = count(&kept);
+        let each = || kept.iter().flat_map(Range::clone);
+        let (offset, slope, reference) = line(each().map(time), each().map(|i| samples[i]));
         (drift.offset, drift.slope_per_s, drift.reference_s) = (offset, slope, reference);
-        let residual: Vec<f64> = kept.iter().map(|&i| samples[i] - drift.at(time(i))).collect();
-        let limit = SPIKE_SIGMA * robust_std(&residual);
-        let before = kept.len();
-        let centre = super::median(&residual);
-        let mut good = residual
-            .iter()
-            .map(|r| limit == 0.0 || (r - centre).abs() <= limit);
-        kept.retain(|_| good.next().unwrap_or(true));
-        if kept.len() == before || kept.len() < 2 {
+        let residual = |i: usize| samples[i] - drift.at(time(i));
+        let some: Vec<f64> = each()
+            .step_by(before.div_ceil(ENOUGH_FOR_SCATTER))
+            .map(residual)
+            .collect();
+        let limit = SPIKE_SIGMA * robust_std(&some);
+        let centre = super::median(&some);
+        let is_good = |i: usize| limit == 0.0 || (residual(i) - centre).abs() <= limit;
+        kept = kept.iter().flat_map(|r| stretches(r, is_good)).collect();
+        if count(&kept) == before || count(&kept) < 2 {
             break;
         }
     }
@@ -146,31 +149,56 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
     drift
 }
 
+/// Samples in all of them.
+fn count(ranges: &[Range<usize>]) -> usize {
+    ranges.iter().map(Range::len).sum()
+}
+
+/// The stretches of `range` without what is not good.
+fn stretches(range: &Range<usize>, is_good: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut stretches = Vec::new();
+    let mut start = range.start;
+    for bad in range.clone().filter(|i| !is_good(*i)) {
+        stretches.push(start..bad);
+        start = bad + 1;
+    }
+    stretches.push(start..range.end);
+    stretches.retain(|r| !r.is_empty());
+    stretches
+}
+
+/// The samples of `kept` that belong to one segment of air.
+fn inside(kept: &[Range<usize>], segment: &Range<usize>) -> impl Iterator<Item = usize> + Clone {
+    let of_segment = kept.iter().filter(|r| segment.contains(&r.start));
+    of_segment.flat_map(Range::clone)
+}
+
 /// Is the air before and after the cut two parallel lines rather than one? Then the zero jumped in between, and the line
 /// goes half-way.
-fn jump(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air, time: &impl Fn(usize) -> f64) {
+fn jump(
+    drift: &mut DriftLine,
+    samples: &[f64],
+    kept: &[Range<usize>],
+    air: &Air,
+    time: &impl Fn(usize) -> f64,
+) {
     // Block means of both segments: time, value, and whether it is after the cut.
     let mut points: Vec<(f64, f64, f64)> = Vec::new();
     for (side, range) in air.ranges().enumerate() {
-        let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
-        let per_block = inside.len() / BLOCKS_PER_SEGMENT;
+        let all = inside(kept, range);
+        let per_block = all.clone().count() / BLOCKS_PER_SEGMENT;
         if per_block < 2 {
             return;
         }
-        points.extend(
-            inside
-                .chunks_exact(per_block)
-                .take(BLOCKS_PER_SEGMENT)
-                .map(|block| {
-                    let n = block.len() as f64;
-                    let mean_of = |f: &dyn Fn(usize) -> f64| block.iter().map(|&i| f(i)).sum::<f64>() / n;
-                    (
-                        mean_of(&|i| time(i) - drift.reference_s),
-                        mean_of(&|i| samples[i]),
-                        side as f64,
-                    )
-                }),
-        );
+        points.extend((0..BLOCKS_PER_SEGMENT).map(|k| {
+            let block = || all.clone().skip(k * per_block).take(per_block);
+            let mean_of = |f: &dyn Fn(usize) -> f64| block().map(f).sum::<f64>() / per_block as f64;
+            (
+                mean_of(&|i| time(i) - drift.reference_s),
+                mean_of(&|i| samples[i]),
+                side as f64,
+            )
+        }));
     }
     let basis = DMatrix::from_fn(points.len(), 3, |i, k| [1.0, points[i].0, points[i].2][k]);
     let value = DVector::from_iterator(points.len(), points.iter().map(|p| p.1));
@@ -198,17 +226,17 @@ fn jump(drift: &mut DriftLine, samples: &[f64], kept: &[usize], air: &Air, time:
 fn uncertainty(
     drift: &mut DriftLine,
     samples: &[f64],
-    kept: &[usize],
+    kept: &[Range<usize>],
     air: &Air,
     time: &impl Fn(usize) -> f64,
 ) {
+    let each = || kept.iter().flat_map(Range::clone);
     let residual = |i: usize| samples[i] - drift.at(time(i));
-    let sample_variance = kept.iter().map(|&i| residual(i).powi(2)).sum::<f64>() / kept.len() as f64;
+    let sample_variance = each().map(|i| residual(i).powi(2)).sum::<f64>() / count(kept) as f64;
     let (mut square_sum, mut block_count, mut block_len) = (0.0, 0usize, 0.0);
     let mut bent: Vec<(f64, f64)> = Vec::new();
     for range in air.ranges() {
-        let inside: Vec<usize> = kept.iter().copied().filter(|i| range.contains(i)).collect();
-        let values: Vec<f64> = inside.iter().map(|&i| residual(i)).collect();
+        let values: Vec<f64> = inside(kept, range).map(residual).collect();
         let blocks = SignalBlocks::new(&values, values.len() as f64 / BLOCKS_PER_SEGMENT as f64);
         square_sum += blocks
             .mean
@@ -217,7 +245,7 @@ fn uncertainty(
             .sum::<f64>();
         bent.extend(blocks.mean.iter().enumerate().filter_map(|(k, mean)| {
             let middle = ((k as f64 + 0.5) * blocks.samples_per_block) as usize;
-            Some((time(*inside.get(middle)?), *mean))
+            Some((time(inside(kept, range).nth(middle)?), *mean))
         }));
         block_count += blocks.len();
         block_len += values.len() as f64;
@@ -228,8 +256,8 @@ fn uncertainty(
     } else {
         sample_variance
     };
-    let n = kept.len() as f64;
-    let sxx: f64 = kept.iter().map(|&i| (time(i) - drift.reference_s).powi(2)).sum();
+    let n = count(kept) as f64;
+    let sxx: f64 = each().map(|i| (time(i) - drift.reference_s).powi(2)).sum();
     let mean_block_len = block_len / block_count.max(1) as f64;
     if mean_block_len > 0.0 && per_sample > BEND_RATIO * sample_variance {
         drift.bend = ((per_sample - sample_variance) / mean_block_len).max(0.0).sqrt();

@@ -12,6 +12,8 @@ use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
 const VISIBLE_ERRORS: f64 = 0.15;
+/// Probability that a setup has no small errors but those that are fitted: then nothing is left of them.
+const ALL_FITTED: f64 = 0.5;
 /// Share of what else there is that is not a law at one place of the structure (files, sensors, geometry, several places at
 /// once), so that the test for that need not see it.
 const BESIDES_PLACES: f64 = 0.5;
@@ -72,7 +74,12 @@ fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
     let exponential: fn(f64) -> f64 = |u| (-u).exp();
     // The laboratory's care is a factor (log-normal), and its errors have sizes that are more or less likely together.
     let found = -0.5 * (TAU * CARE * CARE).ln() - beyond.unlikely - largest.excess.ln();
-    Some(found + log_density(after.excess.max(0.0), after.std, rest.small_errors, exponential))
+    let excess = after.excess.max(0.0);
+    let left = [
+        ALL_FITTED.ln() + log_normal(excess, after.std),
+        (1.0 - ALL_FITTED).ln() + log_density(excess, after.std, rest.small_errors, exponential),
+    ];
+    Some(found + log_sum(&left))
 }
 
 /// Odds that something the library does not have is behind what a model leaves, against the small errors of the setup.

@@ -274,7 +274,9 @@ fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, base
             None if !rest.is_significant() => (0.0, 0.0),
             None => return None,
         };
-        Some(gain + 2.0 * (evidence - alone.evidence) - alone.known_to - known_to)
+        let more = gain + 2.0 * (evidence - alone.evidence) - alone.known_to - known_to;
+        // Values that err together count once.
+        Some(more / alone.noise_factor())
     };
     compared().map_or(0.0, |more| {
         evidence_weight(more - gain_by_chance(parameters)).min(1.0)

@@ -49,6 +49,11 @@ impl BeyondSlips {
         self.tests.iter().find(|t| t.looks_like == test.looks_like)
     }
 
+    /// As [`Rest::noise_factor`], of what they leave.
+    pub fn noise_factor(&self) -> f64 {
+        noise_factor(&self.tests)
+    }
+
     /// χ² that the errors take, less what they pay for it.
     pub fn gain(&self) -> f64 {
         2.0 * self.evidence
@@ -119,9 +124,13 @@ impl Rest {
     /// How much larger than those of white noise of the known level the squares of estimates are: noise that neighbouring
     /// lines, or the outputs of one hit, have in common. 1 where that was not tested.
     pub fn noise_factor(&self) -> f64 {
-        let folds = self.tests.iter().filter(|t| t.looks_like == LIKE_FOLDS);
-        folds.map(|t| t.noise_factor).fold(1.0, f64::max)
+        noise_factor(&self.tests)
     }
+}
+
+fn noise_factor(tests: &[RestTest]) -> f64 {
+    let folds = tests.iter().filter(|t| t.looks_like == LIKE_FOLDS);
+    folds.map(|t| t.noise_factor).fold(1.0, f64::max)
 }
 
 /// The test that finds most, of those that find more than chance.

@@ -33,18 +33,30 @@ pub struct Care {
     pub price: f64,
     /// −ln of how likely such standard deviations are, against the likeliest ones.
     pub unlikely: f64,
-    /// ln of the evidence for such errors against none: what they take of χ²/2 less what so many unknowns and their standard
-    /// deviations pay for being fitted.
-    pub evidence: f64,
+    /// ln of the determinant of the information on the errors over that of their prior: by how much the data narrow them down.
+    pub log_det: f64,
+}
+
+impl Care {
+    /// ln of the evidence for such errors against none, where they take `taken` of χ²: half of that less what so many unknowns
+    /// and their standard deviations pay for being fitted (Laplace's approximation at these sizes).
+    pub fn evidence(&self, taken: f64) -> f64 {
+        0.5 * (taken - self.price - self.log_det) - self.unlikely
+    }
 }
 
 /// Errors and care of greatest probability. `information` and `gradient`: those of χ²/2 by the errors, in units of their
-/// usual standard deviations, the model's parameters having followed; `kinds`: the kind of each error, from 0 on.
+/// usual standard deviations, the model's parameters having followed; `kinds`: the kind of each error, from 0 on, `None` where
+/// it has no factor but the laboratory's.
 ///
 /// # Errors
 /// Information that is no number.
-pub fn estimate(information: &DMatrix<f64>, gradient: &DVector<f64>, kinds: &[usize]) -> Result<Care> {
-    let count = kinds.iter().map(|k| k + 1).max().unwrap_or(0);
+pub fn estimate(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    kinds: &[Option<usize>],
+) -> Result<Care> {
+    let count = kinds.iter().flatten().map(|k| k + 1).max().unwrap_or(0);
     let data = Data {
         information,
         gradient,
@@ -79,7 +91,7 @@ pub fn estimate(information: &DMatrix<f64>, gradient: &DVector<f64>, kinds: &[us
     Ok(Care {
         price: here.whitened.norm_squared(),
         unlikely: here.unlikely,
-        evidence: here.evidence - here.unlikely,
+        log_det: here.log_det,
         sizes: -here.whitened.component_mul(&here.factors),
     })
 }
@@ -87,7 +99,7 @@ pub fn estimate(information: &DMatrix<f64>, gradient: &DVector<f64>, kinds: &[us
 struct Data<'a> {
     information: &'a DMatrix<f64>,
     gradient: &'a DVector<f64>,
-    kinds: &'a [usize],
+    kinds: &'a [Option<usize>],
 }
 
 /// The data seen with certain standard deviations.
@@ -99,7 +111,8 @@ struct Seen {
     /// ln of the evidence, and −ln of the prior against its peak.
     evidence: f64,
     unlikely: f64,
-    /// Slope of the evidence by ln of each kind's factor, and its expected curvature with the sign turned.
+    log_det: f64,
+    /// Slope of the evidence by ln of the laboratory's and of each kind's factor, and its expected curvature with the sign turned.
     slope: Vec<f64>,
     curvature: Vec<f64>,
 }
@@ -108,7 +121,8 @@ impl Data<'_> {
     /// `None` where rounding leaves nothing of the information.
     fn at(&self, logs: &DVector<f64>) -> Option<Seen> {
         let n = self.kinds.len();
-        let factors = DVector::from_fn(n, |i, _| MEDIAN * (logs[0] + logs[1 + self.kinds[i]]).exp());
+        let own = |i: usize| self.kinds[i].map_or(0.0, |kind| logs[1 + kind]);
+        let factors = DVector::from_fn(n, |i, _| MEDIAN * (logs[0] + own(i)).exp());
         let whitened = Mat::from_fn(n, n, |i, j| {
             factors[i] * self.information[(i, j)] * factors[j] + if i == j { 1.0 } else { 0.0 }
         });
@@ -118,12 +132,14 @@ impl Data<'_> {
         let gradient = factors.component_mul(self.gradient);
         let whitened = DVector::from_fn(n, |i, _| (0..n).map(|j| inverse[(i, j)] * gradient[j]).sum());
         let evidence = 0.5 * (gradient.dot(&whitened) - log_det);
-        let (mut slope, mut curvature) = (vec![0.0; logs.len() - 1], vec![0.0; logs.len() - 1]);
+        let (mut slope, mut curvature) = (vec![0.0; logs.len()], vec![0.0; logs.len()]);
         for (i, kind) in self.kinds.iter().enumerate() {
             // The share of an error that the data determine, not its prior.
             let determined = 1.0 - inverse[(i, i)];
-            slope[*kind] += whitened[i].powi(2) - determined;
-            curvature[*kind] += 2.0 * determined.powi(2);
+            for factor in std::iter::once(0).chain(kind.map(|kind| 1 + kind)) {
+                slope[factor] += whitened[i].powi(2) - determined;
+                curvature[factor] += 2.0 * determined.powi(2);
+            }
         }
         let kinds: f64 = logs.iter().skip(1).map(|d| cost(*d)[0]).sum();
         let seen = Seen {
@@ -131,6 +147,7 @@ impl Data<'_> {
             whitened,
             evidence,
             unlikely: 0.5 * (logs[0] / CARE).powi(2) + kinds,
+            log_det,
             slope,
             curvature,
         };
@@ -146,14 +163,14 @@ impl Seen {
     fn newton_step(&self, at: &DVector<f64>) -> Result<DVector<f64>> {
         let n = at.len();
         let (mut hessian, mut gradient) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
-        hessian[(0, 0)] = CARE.powi(-2) + self.curvature.iter().sum::<f64>();
-        gradient[0] = at[0] / CARE.powi(2) - self.slope.iter().sum::<f64>();
+        hessian[(0, 0)] = CARE.powi(-2) + self.curvature[0];
+        gradient[0] = at[0] / CARE.powi(2) - self.slope[0];
         for k in 1..n {
             let [_, slope, curvature] = cost(at[k]);
-            hessian[(k, k)] = curvature + self.curvature[k - 1];
-            hessian[(0, k)] = self.curvature[k - 1];
-            hessian[(k, 0)] = self.curvature[k - 1];
-            gradient[k] = slope - self.slope[k - 1];
+            hessian[(k, k)] = curvature + self.curvature[k];
+            hessian[(0, k)] = self.curvature[k];
+            hessian[(k, 0)] = self.curvature[k];
+            gradient[k] = slope - self.slope[k];
         }
         let factor = hessian.cholesky();
         let factor = factor.ok_or_else(|| Error::computation("the care of the laboratory cannot be told"))?;
@@ -192,57 +209,60 @@ mod tests {
     /// rounding (the least eigenvalue a little below zero). There is an answer all the same.
     #[test]
     fn a_rest_that_no_small_error_explains_is_no_failure() {
-        let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
+        let kinds: Vec<Option<usize>> = (0..KINDS * EACH).map(|i| Some(i / EACH)).collect();
         let seen = DMatrix::<f64>::from_fn(KINDS, KINDS * EACH, |row, i| ((row * 7 + i * 3) as f64).sin());
         let rounding = DMatrix::from_diagonal_element(KINDS * EACH, KINDS * EACH, 1e-13);
         let information = seen.tr_mul(&seen) * PLAIN.powi(2) - rounding;
         let gradient = seen.tr_mul(&DVector::from_element(KINDS, 1e12));
         let care = estimate(&information, &gradient, &kinds).unwrap();
         assert!(care.sizes.iter().all(|size| size.is_finite()), "{:?}", care.sizes);
-        assert!(care.price.is_finite() && care.evidence.is_finite());
+        assert!(care.price.is_finite() && care.log_det.is_finite());
     }
 
-    /// Errors with these factors, each seen with noise of its own.
-    fn laboratory(factors: [f64; KINDS], seed: u64) -> Care {
+    /// Errors with these factors, each seen with noise of its own, and the evidence for them.
+    fn laboratory(factors: [f64; KINDS], seed: u64) -> (Care, f64) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || crate::statistics::nearly_normal(&mut random);
-        let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
+        let kinds: Vec<Option<usize>> = (0..KINDS * EACH).map(|i| Some(i / EACH)).collect();
         let gradient = DVector::from_fn(KINDS * EACH, |i, _| {
             PLAIN * (PLAIN * factors[i / EACH] * normal() + normal())
         });
         let information = DMatrix::identity(KINDS * EACH, KINDS * EACH) * PLAIN.powi(2);
-        estimate(&information, &gradient, &kinds).unwrap()
+        let care = estimate(&information, &gradient, &kinds).unwrap();
+        let taken = -2.0 * gradient.dot(&care.sizes) - care.sizes.dot(&(&information * &care.sizes));
+        let evidence = care.evidence(taken);
+        (care, evidence)
     }
 
     #[test]
     fn usual_laboratories_are_likely_and_one_that_is_wrong_in_one_thing_only_is_not() {
         for (seed, care) in [(1, 0.25), (2, 0.5), (3, 1.0)] {
-            let usual = laboratory([care; KINDS], seed);
+            let (usual, _) = laboratory([care; KINDS], seed);
             assert!(usual.unlikely < 1.5, "{care}: {usual:?}");
         }
-        let one_perfect = laboratory([0.6, 0.6, 0.01, 0.6, 0.6, 0.6], 4);
+        let (one_perfect, _) = laboratory([0.6, 0.6, 0.01, 0.6, 0.6, 0.6], 4);
         assert!(one_perfect.unlikely < 4.0, "{}", one_perfect.unlikely);
-        let one_wrong = laboratory([0.0, 0.0, 3.0, 0.0, 0.0, 0.0], 5);
+        let (one_wrong, _) = laboratory([0.0, 0.0, 3.0, 0.0, 0.0, 0.0], 5);
         assert!(one_wrong.unlikely > 8.0, "{}", one_wrong.unlikely);
     }
 
     #[test]
     fn errors_are_found_and_paid_for() {
-        let care = laboratory([0.5; KINDS], 6);
+        let (care, evidence) = laboratory([0.5; KINDS], 6);
         let spread = (care.sizes.norm_squared() / (KINDS * EACH) as f64).sqrt();
         assert!((spread / 0.5 - 1.0).abs() < 0.15, "{spread}");
         let each = care.price / (KINDS * EACH) as f64;
         assert!((each - 1.0).abs() < 0.1, "{each}");
-        assert!(care.evidence > 1000.0);
+        assert!(evidence > 1000.0);
         // Of noise alone they take nothing.
-        let nothing = laboratory([0.0; KINDS], 7);
-        assert!(nothing.evidence < 1.0, "{}", nothing.evidence);
+        let (_, nothing) = laboratory([0.0; KINDS], 7);
+        assert!(nothing < 1.0, "{nothing}");
     }
 
     /// The slopes are those of the evidence.
     #[test]
     fn slopes_are_differences() {
-        let kinds = [0, 0, 1];
+        let kinds = [Some(0), None, Some(1)];
         let information = DMatrix::from_row_slice(3, 3, &[9.0, 2.0, 1.0, 2.0, 5.0, 0.5, 1.0, 0.5, 20.0]);
         let gradient = DVector::from_row_slice(&[4.0, -7.0, 9.0]);
         let data = Data {
@@ -252,9 +272,9 @@ mod tests {
         };
         let at = DVector::from_row_slice(&[0.3, -0.4, 0.2]);
         let here = data.at(&at).unwrap();
-        for k in 0..2 {
+        for k in 0..3 {
             let mut step = DVector::zeros(3);
-            step[1 + k] = 1e-5;
+            step[k] = 1e-5;
             let [up, down] = [1.0, -1.0].map(|s| data.at(&(&at + &step * s)).unwrap().evidence);
             assert!(((up - down) / 2e-5 - here.slope[k]).abs() < 1e-5);
         }

@@ -24,18 +24,22 @@ pub enum SmallError {
     Corner,
     /// A parameter of the model (solver's scale): its stiffness at this posture.
     Stiffness(usize),
+    /// All stiffnesses, ln per campaign, in the order of measurement.
+    Warming,
 }
 
 impl SmallError {
-    /// Errors of one kind show the same care; from 0 on.
-    pub fn kind(self) -> usize {
+    /// Errors of one kind show the same care; from 0 on. `None` for one that is as large as the laboratory's care as a whole has it:
+    /// a robot that warms up by far more than that is no small error.
+    pub fn kind(self) -> Option<usize> {
         match self {
-            SmallError::Encoder(_) => 0,
-            SmallError::Gain => 1,
-            SmallError::Hit(_) => 2,
-            SmallError::Sensor(_) => 3,
-            SmallError::Corner => 4,
-            SmallError::Stiffness(_) => 5,
+            SmallError::Encoder(_) => Some(0),
+            SmallError::Gain => Some(1),
+            SmallError::Hit(_) => Some(2),
+            SmallError::Sensor(_) => Some(3),
+            SmallError::Corner => Some(4),
+            SmallError::Stiffness(_) => Some(5),
+            SmallError::Warming => None,
         }
     }
 }
@@ -53,8 +57,8 @@ pub struct Slipped {
 }
 
 impl Slipped {
-    /// Adds an error of size `value` where `place` says, the posture being this one. [`SmallError::Stiffness`] is the model's own
-    /// and not seen here.
+    /// Adds an error of size `value` where `place` says, the posture being this one. [`SmallError::Stiffness`] and
+    /// [`SmallError::Warming`] are the model's own and not seen here.
     pub fn add(&mut self, error: SmallError, place: &FrfGroup, value: f64) {
         let hits = |i: usize| place.reference_axis.is_none_or(|axis| axis.index() == i);
         match error {
@@ -69,7 +73,7 @@ impl Slipped {
                 self.sensors_deg.extend(place.response_point.map(|p| (p, turn)));
             }
             SmallError::Corner => self.corner_rad_per_s += value,
-            SmallError::Stiffness(_) => {}
+            SmallError::Stiffness(_) | SmallError::Warming => {}
         }
     }
 }

@@ -24,20 +24,22 @@ use crate::identify::rest::{AfterSlips, RestCurve};
 use crate::parameter::Scale;
 
 /// Standard deviations of what a careful setup is wrong by: angles of the joints and of the sensors, direction of the hits
-/// (deg), gain of the hammer (relative), stiffness from posture to posture (relative), corner of the sensors (Hz).
+/// (deg), gain of the hammer (relative), stiffness from posture to posture (relative) and from the first to the last one of a
+/// robot that warms up (relative), corner of the sensors (Hz).
 const ENCODER_DEG: f64 = 0.1;
 const SENSOR_DEG: f64 = 0.7;
 const HIT_DEG: f64 = 1.5;
 const GAIN: f64 = 0.01;
 const STIFFNESS: f64 = 0.003;
+const WARMING: f64 = 0.01;
 const CORNER_HZ: f64 = 0.03;
 
 /// Differences are taken over this many standard deviations.
 const STEP: f64 = 1e-2;
 /// Steps of the estimate, all with the slopes at the model's optimum.
-const STEPS: usize = 3;
-/// Relative change of what is left by which a step no longer matters.
-const SETTLED: f64 = 1e-3;
+const STEPS: usize = 5;
+/// Change of χ² by which a step no longer matters: effects are told from small errors by differences of ten.
+const SETTLED: f64 = 1.0;
 
 /// One error: what it does where it is, and each place that it may be at on its own.
 struct Slip {
@@ -74,7 +76,7 @@ pub fn absorb(
         let after = AfterSlips {
             price: care.price,
             unlikely: care.unlikely,
-            evidence: care.evidence + 0.5 * (before - energy(&origin) + expected - left),
+            evidence: care.evidence(before - left),
             known_to: (left - expected).abs(),
             rest,
         };
@@ -83,7 +85,7 @@ pub fn absorb(
             origin = system.moved(&after.rest, &sizes, -1.0);
             best = Some(after);
         }
-        if !better || (left - expected).abs() < SETTLED * left {
+        if !better || (left - expected).abs() < SETTLED {
             break;
         }
     }
@@ -115,8 +117,8 @@ struct System<'a> {
     starts: Vec<usize>,
     /// Curve by curve: slips that concern it and their unknown.
     active: Vec<Vec<(usize, usize)>>,
-    /// Kind of each error.
-    kinds: Vec<usize>,
+    /// Kind of each error, see [`SmallError::kind`].
+    kinds: Vec<Option<usize>>,
     of_model: Cholesky<f64, Dyn>,
     /// What the model's parameters do about a unit of each error.
     follow: DMatrix<f64>,
@@ -271,6 +273,8 @@ impl<'a> System<'a> {
                 let size = slip.std * sizes[start + place];
                 match slip.error {
                     SmallError::Stiffness(i) => theta[i] += size,
+                    SmallError::Warming => stiffnesses(self.model)
+                        .for_each(|i| theta[i] += size * block.conditions.order_fraction),
                     error => slipped.add(error, group, size),
                 }
             }
@@ -413,21 +417,42 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
         }
     }
     // What a joint's stiffness does at a posture is what it does at all of them.
-    let stiffness = model.parameters.iter().enumerate();
-    slips.extend(
-        stiffness
-            .filter(|(_, p)| p.scale == Scale::Logarithmic && p.name.contains("stiffness"))
-            .map(|(i, _)| Slip {
-                error: SmallError::Stiffness(i),
-                std: STIFFNESS,
-                change: curves
-                    .iter()
-                    .map(|c| c.slopes[i].iter().map(|s| s * STIFFNESS).collect())
-                    .collect(),
-                places: postures.clone(),
-            }),
-    );
+    slips.extend(stiffnesses(model).map(|i| {
+        Slip {
+            error: SmallError::Stiffness(i),
+            std: STIFFNESS,
+            change: curves
+                .iter()
+                .map(|c| c.slopes[i].iter().map(|s| s * STIFFNESS).collect())
+                .collect(),
+            places: postures.clone(),
+        }
+    }));
+    // In the order of two postures nothing can be seen.
+    if postures.len() > 2 {
+        let change = |((block, _), curve): ((&FrfBlock, _), &RestCurve)| -> Vec<Complex64> {
+            let size = WARMING * block.conditions.order_fraction;
+            let lines = 0..curve.rest.len();
+            lines
+                .map(|l| stiffnesses(model).map(|i| curve.slopes[i][l]).sum::<Complex64>() * size)
+                .collect()
+        };
+        slips.push(Slip {
+            error: SmallError::Warming,
+            std: WARMING,
+            change: data.frfs().zip(curves).map(change).collect(),
+            places: vec![FrfGroup::ALL],
+        });
+    }
     Ok(slips)
+}
+
+/// The stiffnesses among the model's parameters.
+fn stiffnesses(model: &StructureModel) -> impl Iterator<Item = usize> {
+    let parameters = model.parameters.iter().enumerate();
+    parameters
+        .filter(|(_, p)| p.scale == Scale::Logarithmic && p.name.contains("stiffness"))
+        .map(|(i, _)| i)
 }
 
 /// Which error the numbers of a mistake are.

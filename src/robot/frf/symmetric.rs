@@ -60,7 +60,7 @@ mod tests {
 
     fn vector(n: usize, k: usize) -> DVector<f64> {
         DVector::from_fn(n, |i, _| {
-            ((3 * i + 7 * k + 1) as f64).sin() * 10f64.powi(i as i32 % 4)
+            (((3 + 2 * k) * i + 7 * k + 1) as f64).sin() * 10f64.powi(i as i32 % 4)
         })
     }
 

@@ -198,10 +198,10 @@ pub fn decide<D: Modelled>(
         _ => first,
     };
     let excused = match (&set, first) {
-        (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, baseline),
+        (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, &baseline.rest),
         (None, Some(w)) => {
             let c = &candidates[w];
-            weight_of_slips_alone(c.gain, c.rest.as_ref(), c.parameters.len(), baseline)
+            weight_of_slips_alone(c.gain, c.rest.as_ref(), c.parameters.len(), &baseline.rest)
         }
         (None, None) => 1.0,
     };
@@ -263,20 +263,21 @@ fn odds_against<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> 
 }
 
 /// Weight of the small errors of the setup alone against the same with effects of so many `parameters` that take `gain` of χ² away
-/// and leave `rest`: 1 where they need them not. Zero where such errors are not in question.
-fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, baseline: &BaselineFit) -> f64 {
+/// and leave `rest`, `baseline` being that of the model without them: 1 where they need them not. Zero where such errors are not in
+/// question.
+fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, baseline: &Rest) -> f64 {
     let compared = || {
-        let alone = baseline.rest.beyond_slips.as_ref()?;
+        let alone = baseline.beyond_slips.as_ref()?;
         // Where the effects leave noise no such errors were sought.
         let rest = rest?;
-        let (evidence, known_to) = match &rest.beyond_slips {
-            Some(with) => (with.evidence, with.known_to),
-            None if !rest.is_significant() => (0.0, 0.0),
+        let (evidence, known_to, together) = match &rest.beyond_slips {
+            Some(with) => (with.evidence, with.known_to, with.noise_factor()),
+            None if !rest.is_significant() => (0.0, 0.0, rest.noise_factor()),
             None => return None,
         };
         let more = gain + 2.0 * (evidence - alone.evidence) - alone.known_to - known_to;
-        // Values that err together count once.
-        Some(more / alone.noise_factor())
+        // Values that err together count once; where much is left, that is not noise and no measure of it.
+        Some(more / together.min(alone.noise_factor()))
     };
     compared().map_or(0.0, |more| {
         evidence_weight(more - gain_by_chance(parameters)).min(1.0)
@@ -344,6 +345,44 @@ pub fn evidence_weight(delta_bic: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::rest::{BeyondSlips, LIKE_FOLDS, RestTest};
+
+    /// A rest after small errors of this evidence, with noise of which the folds show this multiple.
+    fn after_slips(evidence: f64, noise_factor: f64) -> Rest {
+        let tests = vec![RestTest {
+            looks_like: LIKE_FOLDS,
+            excess: 0.0,
+            std: 10.0,
+            p_value: 0.5,
+            noise_factor,
+        }];
+        Rest {
+            tests: tests.clone(),
+            small_errors: 100.0,
+            beyond_slips: Some(BeyondSlips {
+                tests,
+                unlikely: 1.0,
+                evidence,
+                known_to: 0.0,
+            }),
+        }
+    }
+
+    /// One parameter gains 10.8 by chance.
+    #[test]
+    fn an_effect_that_small_errors_need_not_is_excused() {
+        let weight = |gain: f64, with: &Rest, alone: &Rest| weight_of_slips_alone(gain, Some(with), 1, alone);
+        let (with, alone) = (after_slips(500.0, 1.0), after_slips(1000.0, 1.0));
+        assert_eq!(weight(1010.0, &with, &alone), 1.0);
+        assert!(weight(1030.0, &with, &alone) < 0.25);
+        // Of values that err together half say as much.
+        let (with, alone) = (after_slips(500.0, 2.0), after_slips(1000.0, 2.0));
+        assert_eq!(weight(1020.0, &with, &alone), 1.0);
+        assert!(weight(1060.0, &with, &alone) < 0.25);
+        // What small errors alone leave of a model that is far off is not noise, however alike its values are.
+        let far_off = after_slips(1000.0, 5000.0);
+        assert!(weight(40_000.0, &with, &far_off) < 1e-6);
+    }
 
     fn errors(by_fold: &[f64]) -> HeldOut {
         HeldOut {

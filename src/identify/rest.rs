@@ -83,7 +83,7 @@ const SIGNIFICANT_P: f64 = 1e-5;
 /// What the patterns of one place look like.
 pub const LIKE_A_PLACE: &str = "one law at one place of the structure, the same at all postures";
 /// What the patterns of folds with parameters of their own look like.
-pub(super) const LIKE_FOLDS: &str = "parameters that differ from posture to posture";
+pub(crate) const LIKE_FOLDS: &str = "parameters that differ from posture to posture";
 
 impl Rest {
     /// Whether more than noise is left.

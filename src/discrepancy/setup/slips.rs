@@ -430,12 +430,11 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
     }));
     // In the order of two postures nothing can be seen.
     if postures.len() > 2 {
+        let all: Vec<usize> = stiffnesses(model).collect();
         let change = |((block, _), curve): ((&FrfBlock, _), &RestCurve)| -> Vec<Complex64> {
             let size = WARMING * block.conditions.order_fraction;
-            let lines = 0..curve.rest.len();
-            lines
-                .map(|l| stiffnesses(model).map(|i| curve.slopes[i][l]).sum::<Complex64>() * size)
-                .collect()
+            let together = |l: usize| all.iter().map(|i| curve.slopes[*i][l]).sum::<Complex64>();
+            (0..curve.rest.len()).map(|l| together(l) * size).collect()
         };
         slips.push(Slip {
             error: SmallError::Warming,

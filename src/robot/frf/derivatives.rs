@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use num_complex::Complex64;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::side_by_side::{LANES, Lanes, dots, real_dots};
+use super::side_by_side::{LANES, Lanes, dots, real_dots, three};
 use super::symmetric::Symmetric;
 use crate::robot::chain::System;
 
@@ -283,10 +283,6 @@ impl WithSimd for AtRates<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // With three vectors at a time: one hit along each axis.
-        fn three<'a>(of: impl Fn(usize) -> &'a [Lanes], from: usize, count: usize) -> [&'a [Lanes]; 3] {
-            std::array::from_fn(|k| of((from + k).min(count - 1)))
-        }
         let AtRates {
             derivatives,
             rate,
@@ -303,7 +299,7 @@ impl WithSimd for AtRates<'_> {
         } = derivatives;
         let (n, outputs, inputs) = (*n, *outputs, slopes.inputs.len());
         let Slopes {
-            coupling: dynamic,
+            coupling: coupled,
             product,
             along,
             values,
@@ -379,8 +375,8 @@ impl WithSimd for AtRates<'_> {
             };
             if let Some(massless) = massless {
                 for (c, input) in forces.iter().enumerate() {
-                    coupling(massless, *input, dynamic);
-                    for (x, z) in product[n * c..n * (c + 1)].iter_mut().zip(dynamic.iter()) {
+                    coupling(massless, *input, coupled);
+                    for (x, z) in product[n * c..n * (c + 1)].iter_mut().zip(coupled.iter()) {
                         *x += *z;
                     }
                 }
@@ -395,9 +391,9 @@ impl WithSimd for AtRates<'_> {
                     }
                 }
                 if let Some(massless) = massless {
-                    coupling(massless, out, dynamic);
+                    coupling(massless, out, coupled);
                     for first in (0..inputs).step_by(3) {
-                        let sums = dots(simd, dynamic, three(|c| of_output(forces[c]), first, inputs));
+                        let sums = dots(simd, coupled, three(|c| of_output(forces[c]), first, inputs));
                         for ((value, sum), input) in own[first..].iter_mut().zip(sums).zip(&forces[first..]) {
                             *value -= sum;
                             *value -= Lanes::splat(massless.own[out + outputs * (input + outputs * p)]);

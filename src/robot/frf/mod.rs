@@ -21,7 +21,7 @@ use derivatives::Derivatives;
 pub use derivatives::{RowSlopes, Slopes};
 use dynamic_stiffness::{DynamicStiffness, Modes, Room};
 pub use modal_basis::{ModalBasis, natural_frequencies_hz};
-use side_by_side::{LANES, Lanes, real_dots};
+use side_by_side::{LANES, Lanes, real_dots, three};
 
 /// A system in its modal basis, ready to give receptances between chosen outputs at any frequency.
 #[derive(Debug, Clone)]
@@ -112,10 +112,8 @@ impl WithSimd for Receptances<'_> {
         receptances.clear();
         receptances.resize(outputs * shown.len(), Lanes::default());
         for first in (0..shown.len()).step_by(3) {
-            let three: [&[Lanes]; 3] = std::array::from_fn(|k| {
-                let (column, _) = shown[(first + k).min(shown.len() - 1)];
-                &columns[n * column..n * (column + 1)]
-            });
+            let column = |c: usize| &columns[n * shown[c].0..n * (shown[c].0 + 1)];
+            let three = three(column, first, shown.len());
             for out in (0..outputs).step_by(2) {
                 let rows = [out, (out + 1).min(outputs - 1)].map(|out| basis.row(out));
                 for (out, sums) in (out..outputs).zip(real_dots(simd, rows, three)) {

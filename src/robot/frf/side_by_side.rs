@@ -170,6 +170,12 @@ pub(super) fn dot(a: &[Lanes], b: &[Lanes]) -> Lanes {
     sum
 }
 
+/// The vectors from `first` on, three at a time: one hit along each axis. Behind the last of `count` it is shown again.
+#[inline(always)]
+pub(super) fn three<'a>(of: impl Fn(usize) -> &'a [Lanes], first: usize, count: usize) -> [&'a [Lanes]; 3] {
+    std::array::from_fn(|k| of((first + k).min(count - 1)))
+}
+
 /// Σ aᵢ bᵢ with each of three vectors b.
 #[inline(always)]
 pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3] {

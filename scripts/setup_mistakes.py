@@ -11,6 +11,7 @@ Needs numpy for exponential-window only (analytic continuation by the AAA algori
 """
 
 import argparse
+import cmath
 import csv
 import json
 import math
@@ -248,6 +249,14 @@ def amplifier_low_pass(c, draw):
     return "all", corner
 
 
+def late_channel(c, draw):
+    """Responses late by some tenths of a millisecond to milliseconds, in the files of one posture."""
+    late_ms = either(draw, 0.3, 3.0)
+    posture = draw.choice(sorted(c.files))
+    c.change(posture, lambda ch, f, h: h * cmath.exp(-2j * math.pi * f * 1e-3 * late_ms))
+    return f"posture {posture}", late_ms
+
+
 def duplicates(c, draw):
     """Another posture's file filed a second time under a posture that has its own."""
     a, b = draw.sample(sorted(c.files), 2)
@@ -271,6 +280,7 @@ KINDS = {
     "exponential-window": exponential_window,
     "sensor-high-pass": sensor_high_pass,
     "amplifier-low-pass": amplifier_low_pass,
+    "late-channel": late_channel,
     "duplicates": duplicates,
     "none": lambda c, draw: ("", None),
 }

@@ -283,21 +283,29 @@ impl<'a, S: Study> Engine<'a, S> {
         let base_residual = study.residual(model, &base.theta)?;
         // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
         // correlation from value to value says how many of them are independent.
-        let (best_reduced, best_residual) = match refined.first() {
-            Some(best) if best.fit.cost < base.cost => (
+        let best = refined.first().filter(|best| best.fit.cost < base.cost);
+        let (best_reduced, best_residual) = match best {
+            Some(best) => (
                 self.reduced_chi2(best),
                 study.residual(&best.model, &best.fit.theta)?,
             ),
-            _ => (base_reduced, base_residual),
+            None => (base_reduced, base_residual),
         };
         let share = best_residual.independent_share.min(1.0);
         let base_rest = study.rest(model, &base.theta)?;
+        // What a model leaves that is far off has structure from line to line, too, which is no noise.
+        let noise_factor = match best {
+            Some(best) if base_rest.noise_factor() > 1.0 => {
+                study.rest(&best.model, &best.fit.theta)?.noise_factor()
+            }
+            _ => base_rest.noise_factor(),
+        };
         let evidence = Evidence {
             base_chi2: 2.0 * base.cost,
             coarse_base_chi2: 2.0 * coarse_base.cost,
             full_over_coarse: base_reduced * self.freedom(model, Extent::Coarse) / (2.0 * coarse_base.cost),
-            scale: (best_reduced.max(1.0) / share).max(base_rest.noise_factor()),
-            share: share.min(1.0 / base_rest.noise_factor()),
+            scale: (best_reduced.max(1.0) / share).max(noise_factor),
+            share: share.min(1.0 / noise_factor),
             tests: self.instances.len(),
         };
         let labels: Vec<String> = refined.iter().map(|t| self.label(&t.instance)).collect();

@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 use super::setup::CARE;
 use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
 
-/// Probability that the errors of the setup are large enough to be seen.
-const VISIBLE_ERRORS: f64 = 0.15;
+/// Probability that the errors of the setup are large enough to be seen: of a good setup in data that are not very good.
+const VISIBLE_ERRORS: f64 = 0.5;
 /// Probability that a setup has no small errors but those that are fitted: then nothing is left of them.
 const ALL_FITTED: f64 = 0.5;
 /// Share of what else there is that is not a law at one place of the structure (files, sensors, geometry, several places at

@@ -18,7 +18,7 @@ const MEDIAN: f64 = 0.5;
 /// Standard deviation of ln of a kind's factor over the laboratory's, for kinds that are larger than the others.
 const LARGER: f64 = 0.7;
 /// What each e-fold less than the others costs in the end, as ln of a probability.
-const SMALLER: f64 = 0.7;
+const SMALLER: f64 = 0.4;
 /// Change of a logarithm that no longer matters, largest change in one step, and steps.
 const SETTLED: f64 = 0.01;
 const LEAP: f64 = 1.5;
@@ -46,17 +46,16 @@ impl Care {
 }
 
 /// Errors and care of greatest probability. `information` and `gradient`: those of χ²/2 by the errors, in units of their
-/// usual standard deviations, the model's parameters having followed; `kinds`: the kind of each error, from 0 on, `None` where
-/// it has no factor but the laboratory's.
+/// usual standard deviations, the model's parameters having followed; `kinds`: the kind of each error, from 0 on.
 ///
 /// # Errors
 /// Information that is no number.
 pub fn estimate(
     information: &DMatrix<f64>,
     gradient: &DVector<f64>,
-    kinds: &[Option<usize>],
+    kinds: &[usize],
 ) -> Result<Care> {
-    let count = kinds.iter().flatten().map(|k| k + 1).max().unwrap_or(0);
+    let count = kinds.iter().map(|k| k + 1).max().unwrap_or(0);
     let data = Data {
         information,
         gradient,
@@ -99,7 +98,7 @@ pub fn estimate(
 struct Data<'a> {
     information: &'a DMatrix<f64>,
     gradient: &'a DVector<f64>,
-    kinds: &'a [Option<usize>],
+    kinds: &'a [usize],
 }
 
 /// The data seen with certain standard deviations.
@@ -121,8 +120,7 @@ impl Data<'_> {
     /// `None` where rounding leaves nothing of the information.
     fn at(&self, logs: &DVector<f64>) -> Option<Seen> {
         let n = self.kinds.len();
-        let own = |i: usize| self.kinds[i].map_or(0.0, |kind| logs[1 + kind]);
-        let factors = DVector::from_fn(n, |i, _| MEDIAN * (logs[0] + own(i)).exp());
+        let factors = DVector::from_fn(n, |i, _| MEDIAN * (logs[0] + logs[1 + self.kinds[i]]).exp());
         let whitened = Mat::from_fn(n, n, |i, j| {
             factors[i] * self.information[(i, j)] * factors[j] + if i == j { 1.0 } else { 0.0 }
         });
@@ -136,7 +134,7 @@ impl Data<'_> {
         for (i, kind) in self.kinds.iter().enumerate() {
             // The share of an error that the data determine, not its prior.
             let determined = 1.0 - inverse[(i, i)];
-            for factor in std::iter::once(0).chain(kind.map(|kind| 1 + kind)) {
+            for factor in [0, 1 + kind] {
                 slope[factor] += whitened[i].powi(2) - determined;
                 curvature[factor] += 2.0 * determined.powi(2);
             }
@@ -209,7 +207,7 @@ mod tests {
     /// rounding (the least eigenvalue a little below zero). There is an answer all the same.
     #[test]
     fn a_rest_that_no_small_error_explains_is_no_failure() {
-        let kinds: Vec<Option<usize>> = (0..KINDS * EACH).map(|i| Some(i / EACH)).collect();
+        let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
         let seen = DMatrix::<f64>::from_fn(KINDS, KINDS * EACH, |row, i| ((row * 7 + i * 3) as f64).sin());
         let rounding = DMatrix::from_diagonal_element(KINDS * EACH, KINDS * EACH, 1e-13);
         let information = seen.tr_mul(&seen) * PLAIN.powi(2) - rounding;
@@ -223,7 +221,7 @@ mod tests {
     fn laboratory(factors: [f64; KINDS], seed: u64) -> (Care, f64) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || crate::statistics::nearly_normal(&mut random);
-        let kinds: Vec<Option<usize>> = (0..KINDS * EACH).map(|i| Some(i / EACH)).collect();
+        let kinds: Vec<usize> = (0..KINDS * EACH).map(|i| i / EACH).collect();
         let gradient = DVector::from_fn(KINDS * EACH, |i, _| {
             PLAIN * (PLAIN * factors[i / EACH] * normal() + normal())
         });
@@ -262,7 +260,7 @@ mod tests {
     /// The slopes are those of the evidence.
     #[test]
     fn slopes_are_differences() {
-        let kinds = [Some(0), None, Some(1)];
+        let kinds = [0, 0, 1];
         let information = DMatrix::from_row_slice(3, 3, &[9.0, 2.0, 1.0, 2.0, 5.0, 0.5, 1.0, 0.5, 20.0]);
         let gradient = DVector::from_row_slice(&[4.0, -7.0, 9.0]);
         let data = Data {

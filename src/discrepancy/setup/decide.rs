@@ -33,6 +33,9 @@ const LIBRARY: f64 = 25.0;
 /// Share of what stands above the noise from which on a mistake explains it, and below which it does not.
 const EXPLAINS: [f64; 2] = [0.9, 0.4];
 
+/// Mistakes that make one channel late.
+const LATE: [&str; 2] = ["amplifier-low-pass", "late-channel"];
+
 /// The best that the library of effects can do on these data.
 #[derive(Debug, Clone, Default)]
 pub struct Rival {
@@ -116,9 +119,10 @@ pub fn decide(
     // Small errors everywhere have paid for themselves already.
     let small_errors = small_errors.map(|gain| bic(base - gain, 0, 1.0));
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
-    // Two forms of one mistake (the order of a filter) are no rivals: the better one speaks for both.
+    // Two forms of one mistake (the order of a filter, or the delay that it is) are no rivals: the better one speaks for both.
     let alike = |a: &TriedMistake, b: &TriedMistake| {
-        a.finding.kind == b.finding.kind && a.finding.place == b.finding.place
+        let late = |t: &TriedMistake| LATE.contains(&t.finding.kind);
+        a.finding.place == b.finding.place && (a.finding.kind == b.finding.kind || (late(a) && late(b)))
     };
     let first_of_its_kind = |i: usize| {
         !(0..tried.len()).any(|j| {

@@ -24,14 +24,14 @@ use crate::identify::rest::{AfterSlips, RestCurve};
 use crate::parameter::Scale;
 
 /// Standard deviations of what a careful setup is wrong by: angles of the joints and of the sensors, direction of the hits
-/// (deg), gain of the hammer (relative), stiffness from posture to posture (relative) and from the first to the last one of a
-/// robot that warms up (relative), corner of the sensors (Hz).
+/// (deg), gain of the hammer (relative), stiffness from posture to posture (relative), by chance and as a robot that warms up
+/// changes it from one to the next, corner of the sensors (Hz).
 const ENCODER_DEG: f64 = 0.1;
 const SENSOR_DEG: f64 = 0.7;
 const HIT_DEG: f64 = 1.5;
 const GAIN: f64 = 0.01;
 const STIFFNESS: f64 = 0.003;
-const WARMING: f64 = 0.01;
+const WARMING: f64 = 0.002;
 const CORNER_HZ: f64 = 0.03;
 
 /// Differences are taken over this many standard deviations.
@@ -118,7 +118,7 @@ struct System<'a> {
     /// Curve by curve: slips that concern it and their unknown.
     active: Vec<Vec<(usize, usize)>>,
     /// Kind of each error, see [`SmallError::kind`].
-    kinds: Vec<Option<usize>>,
+    kinds: Vec<usize>,
     of_model: Cholesky<f64, Dyn>,
     /// What the model's parameters do about a unit of each error.
     follow: DMatrix<f64>,
@@ -431,14 +431,15 @@ fn slips(model: &StructureModel, data: &FrfData, theta: &[f64], curves: &[RestCu
     // In the order of two postures nothing can be seen.
     if postures.len() > 2 {
         let all: Vec<usize> = stiffnesses(model).collect();
+        let std = WARMING * (postures.len() - 1) as f64;
         let change = |((block, _), curve): ((&FrfBlock, _), &RestCurve)| -> Vec<Complex64> {
-            let size = WARMING * block.conditions.order_fraction;
+            let size = std * block.conditions.order_fraction;
             let together = |l: usize| all.iter().map(|i| curve.slopes[*i][l]).sum::<Complex64>();
             (0..curve.rest.len()).map(|l| together(l) * size).collect()
         };
         slips.push(Slip {
             error: SmallError::Warming,
-            std: WARMING,
+            std,
             change: data.frfs().zip(curves).map(change).collect(),
             places: vec![FrfGroup::ALL],
         });

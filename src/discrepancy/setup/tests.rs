@@ -141,7 +141,7 @@ fn mistakes_are_found_with_their_size() {
     };
     let tau = std::f64::consts::TAU;
     // Index among the mistakes, where, sizes, kind, value told.
-    let cases: [(usize, FrfGroup, &[f64], &str, f64); 8] = [
+    let cases: [(usize, FrfGroup, &[f64], &str, f64); 10] = [
         (2, at(None), &[0.8], "encoder-offset", 0.8),
         (4, at(Some(1)), &[-2.0], "encoder-offset", -2.0),
         (7, at(None), &[0.03, -0.02, 0.01], "point-position", 37.42),
@@ -150,6 +150,8 @@ fn mistakes_are_found_with_their_size() {
         (11, at(None), &[1.5], "exponential-window", 1.5),
         (12, at(None), &[tau], "sensor-high-pass", 1.0),
         (16, at(None), &[3.0], "sensor-mass", 3.0),
+        (17, at(Some(1)), &[8e-4], "late-channel", 0.8),
+        (15, at(Some(1)), &[1.0 / (tau * 100.0)], "amplifier-low-pass", 100.0),
     ];
     for (seed, (index, group, values, kind, told)) in cases.into_iter().enumerate() {
         let made = Made {
@@ -308,6 +310,8 @@ fn filters_do_to_a_file_what_their_corner_says() {
         (13, 1.0 / corner_rad, 1.0 / (1.0 + i)),
         (15, 1.0 / corner_rad, 1.0 / (i * std::f64::consts::SQRT_2)),
         (8, 0.3, Complex64::from(0.3f64.exp())),
+        // Late by a quarter of the period.
+        (17, 0.25 * std::f64::consts::TAU / corner_rad, -i),
     ];
     for (index, value, expected) in cases {
         let [with, without] = spoilt(&model, index, &[value]);

@@ -5,6 +5,7 @@ pub(super) mod channel_gain;
 pub(super) mod encoder_offset;
 mod exponential_window;
 pub(super) mod hit_direction;
+mod late_channel;
 mod point_position;
 pub(super) mod sensor_high_pass;
 mod sensor_mass;
@@ -39,5 +40,6 @@ pub fn all(model: &StructureModel, data: &FrfData) -> Vec<Box<dyn Mistake>> {
         all.push(Box::new(amplifier_low_pass::AmplifierLowPass { order }));
     }
     all.push(Box::new(sensor_mass::SensorMass));
+    all.push(Box::new(late_channel::LateChannel));
     all
 }

@@ -10,10 +10,10 @@ use std::f64::consts::TAU;
 use super::setup::CARE;
 use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
 
-/// Probability that the errors of the setup are large enough to be seen: of a good setup in data that are not very good.
-const VISIBLE_ERRORS: f64 = 0.5;
+/// Probability that the errors of the setup are large enough to be seen.
+const VISIBLE_ERRORS: f64 = 0.1;
 /// Probability that a setup has no small errors but those that are fitted: then nothing is left of them.
-const ALL_FITTED: f64 = 0.5;
+const ALL_FITTED: f64 = 0.9;
 /// Share of what else there is that is not a law at one place of the structure (files, sensors, geometry, several places at
 /// once), so that the test for that need not see it.
 const BESIDES_PLACES: f64 = 0.5;
@@ -46,9 +46,9 @@ fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
         return 0.0;
     }
     if let Some(largest) = rest.largest() {
-        let plain = of_test(gain, largest, rest.small_errors, rest_of_a_stand_in);
-        let excused = excused(gain, largest, rest).unwrap_or(f64::NEG_INFINITY);
-        return log_sum(&[plain, excused]);
+        // Where small errors were fitted, what they leave tells more than the size of the rest.
+        return excused(gain, largest, rest)
+            .unwrap_or_else(|| of_test(gain, largest, rest.small_errors, rest_of_a_stand_in));
     }
     let factors = rest
         .tests

@@ -35,7 +35,7 @@ pub struct Rest {
 pub struct BeyondSlips {
     /// The same tests; what the errors pay for their sizes is part of the excess.
     pub tests: Vec<RestTest>,
-    /// −ln of how likely errors of such sizes are, against those of a usual laboratory.
+    /// −ln of how likely errors of such sizes are in one laboratory, over how likely they are where they only imitate something else.
     pub unlikely: f64,
     /// ln of the evidence for such errors against none.
     pub evidence: f64,

@@ -16,9 +16,11 @@ use crate::{Error, Result};
 pub const CARE: f64 = 1.0;
 const MEDIAN: f64 = 0.5;
 /// Standard deviation of ln of a kind's factor over the laboratory's, for kinds that are larger than the others.
-const LARGER: f64 = 0.7;
+const LARGER: f64 = 0.5;
 /// What each e-fold less than the others costs in the end, as ln of a probability.
 const SMALLER: f64 = 0.4;
+/// How many times as far the factors of the kinds spread where they only imitate something else.
+const UNRELATED: f64 = 2.0;
 /// Change of a logarithm that no longer matters, largest change in one step, and steps.
 const SETTLED: f64 = 0.01;
 const LEAP: f64 = 1.5;
@@ -33,6 +35,9 @@ pub struct Care {
     pub price: f64,
     /// −ln of how likely such standard deviations are, against the likeliest ones.
     pub unlikely: f64,
+    /// ln of how much denser the factors of the kinds lie in one laboratory than where they have nothing to do with one another, at
+    /// the likeliest ones: what the data do not tell apart counts for nothing.
+    pub kinship: f64,
     /// ln of the determinant of the information on the errors over that of their prior: by how much the data narrow them down.
     pub log_det: f64,
 }
@@ -50,11 +55,7 @@ impl Care {
 ///
 /// # Errors
 /// Information that is no number.
-pub fn estimate(
-    information: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    kinds: &[usize],
-) -> Result<Care> {
+pub fn estimate(information: &DMatrix<f64>, gradient: &DVector<f64>, kinds: &[usize]) -> Result<Care> {
     let count = kinds.iter().map(|k| k + 1).max().unwrap_or(0);
     let data = Data {
         information,
@@ -90,6 +91,7 @@ pub fn estimate(
     Ok(Care {
         price: here.whitened.norm_squared(),
         unlikely: here.unlikely,
+        kinship: here.kinship(),
         log_det: here.log_det,
         sizes: -here.whitened.component_mul(&here.factors),
     })
@@ -156,6 +158,12 @@ impl Data<'_> {
 impl Seen {
     fn objective(&self) -> f64 {
         self.unlikely - self.evidence
+    }
+
+    fn kinship(&self) -> f64 {
+        let wider = UNRELATED.powi(2) - 1.0;
+        let resolved = self.curvature[1..].iter().map(|c| c / (c + LARGER.powi(-2)));
+        resolved.map(|share| 0.5 * (wider * share).ln_1p()).sum()
     }
 
     fn newton_step(&self, at: &DVector<f64>) -> Result<DVector<f64>> {
@@ -242,6 +250,20 @@ mod tests {
         assert!(one_perfect.unlikely < 4.0, "{}", one_perfect.unlikely);
         let (one_wrong, _) = laboratory([0.0, 0.0, 3.0, 0.0, 0.0, 0.0], 5);
         assert!(one_wrong.unlikely > 8.0, "{}", one_wrong.unlikely);
+    }
+
+    #[test]
+    fn only_kinds_that_the_data_show_are_kin() {
+        let (plain, _) = laboratory([0.6; KINDS], 8);
+        let most = KINDS as f64 * UNRELATED.ln();
+        assert!(
+            plain.kinship > 0.9 * most && plain.kinship < most,
+            "{}",
+            plain.kinship
+        );
+        let (nothing, _) = laboratory([0.0; KINDS], 9);
+        // Noise alone bounds the factors from above only.
+        assert!(nothing.kinship < 0.4 * most, "{}", nothing.kinship);
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub fn absorb(
         let (expected, left) = (energy(&linear), energy(&rest));
         let after = AfterSlips {
             price: care.price,
-            unlikely: care.unlikely,
+            unlikely: care.unlikely - care.kinship,
             evidence: care.evidence(before - left),
             known_to: (left - expected).abs(),
             rest,

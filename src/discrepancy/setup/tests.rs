@@ -151,7 +151,13 @@ fn mistakes_are_found_with_their_size() {
         (12, at(None), &[tau], "sensor-high-pass", 1.0),
         (16, at(None), &[3.0], "sensor-mass", 3.0),
         (17, at(Some(1)), &[8e-4], "late-channel", 0.8),
-        (15, at(Some(1)), &[1.0 / (tau * 100.0)], "amplifier-low-pass", 100.0),
+        (
+            15,
+            at(Some(1)),
+            &[1.0 / (tau * 100.0)],
+            "amplifier-low-pass",
+            100.0,
+        ),
     ];
     for (seed, (index, group, values, kind, told)) in cases.into_iter().enumerate() {
         let made = Made {

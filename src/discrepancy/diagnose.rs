@@ -345,7 +345,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .collect();
         self.test_rests(&mut candidates, &credible)?;
         let winner = credible.iter().position(|c| *c);
-        self.excuse(&mut baseline, winner.map(|w| &mut candidates[w]))?;
+        let leader = self.excuse(&mut baseline, &mut candidates, winner)?;
         let mut pairs = None;
         // What explains more than the winner, were its size possible, may be possible beside another.
         let leading: Vec<bool> = candidates
@@ -367,7 +367,7 @@ impl<'a, S: Study> Engine<'a, S> {
             }
             _ => None,
         };
-        let mut decision = verdict::decide(&candidates, &credible, &baseline, set, evidence.scale);
+        let mut decision = verdict::decide(&candidates, &credible, leader, &baseline, set, evidence.scale);
         let too_little_data = self
             .too_little_data()
             .or_else(|| explains_nothing(baseline.residual.nrms, baseline.reduced_chi2));
@@ -419,16 +419,44 @@ impl<'a, S: Study> Engine<'a, S> {
         }
     }
 
-    /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands.
-    fn excuse(&self, baseline: &mut BaselineFit, winner: Option<&mut CandidateOf<S>>) -> Result<()> {
-        if let Some(c) = winner {
-            let Some(rest) = &mut c.rest else { return Ok(()) };
-            rest.beyond_slips = self.beyond_slips(rest, &c.model, &c.theta)?;
-            if rest.beyond_slips.is_none() {
-                return Ok(());
+    /// What small errors of the setup can take of the rest: the winner's, and the model's as it stands. Where they take nearly all of the
+    /// winner's, the effect leads that explains most together with them: one that they can do themselves explains nothing.
+    fn excuse(
+        &self,
+        baseline: &mut BaselineFit,
+        candidates: &mut [CandidateOf<S>],
+        winner: Option<usize>,
+    ) -> Result<Option<usize>> {
+        if let Some(w) = winner {
+            self.excuse_candidate(&mut candidates[w])?;
+            let rest = candidates[w].rest.as_ref();
+            if rest.is_none_or(|rest| rest.beyond_slips.is_none()) {
+                return Ok(winner);
             }
         }
         baseline.rest.beyond_slips = self.beyond_slips(&baseline.rest, self.model, &baseline.theta)?;
+        let Some(w) = winner.filter(|w| verdict::mostly_slips(&candidates[*w])) else {
+            return Ok(winner);
+        };
+        let rivals: Vec<&mut CandidateOf<S>> = candidates[w + 1..]
+            .iter_mut()
+            .filter(|c| c.rest.is_some())
+            .collect();
+        rivals
+            .into_par_iter()
+            .try_for_each(|c| self.excuse_candidate(c))?;
+        let gain =
+            |i: usize| verdict::gain_with_slips(&candidates[i]).map_or(f64::NEG_INFINITY, |(gain, _)| gain);
+        // The first of equals: candidates stand in the order of their BIC.
+        Ok((w..candidates.len())
+            .rev()
+            .max_by(|a, b| gain(*a).total_cmp(&gain(*b))))
+    }
+
+    fn excuse_candidate(&self, c: &mut CandidateOf<S>) -> Result<()> {
+        if let Some(rest) = &mut c.rest {
+            rest.beyond_slips = self.beyond_slips(rest, &c.model, &c.theta)?;
+        }
         Ok(())
     }
 

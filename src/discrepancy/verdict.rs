@@ -172,10 +172,11 @@ pub fn leaves_room<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) 
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }
 
-/// `set`: the best of several effects together, where that was sought.
+/// `leader`: the credible candidate that explains most; `set`: the best of several effects together, where that was sought.
 pub fn decide<D: Modelled>(
     candidates: &[EffectCandidate<D>],
     credible: &[bool],
+    leader: Option<usize>,
     baseline: &BaselineFit,
     set: Option<EffectSet>,
     scale: f64,
@@ -188,14 +189,13 @@ pub fn decide<D: Modelled>(
         confidence: 0.0,
         indistinguishable: Vec::new(),
     };
-    let first = credible.iter().position(|c| *c);
     let alone = |w: usize| odds_against(&candidates[w], baseline);
     let odds_of_set = set.as_ref().map_or(f64::INFINITY, EffectSet::odds_against);
-    let set = set.filter(|_| odds_of_set < first.map_or(1.0, alone).min(1.0));
+    let set = set.filter(|_| odds_of_set < leader.map_or(1.0, alone).min(1.0));
     // Effects that are credible together only.
     let first = match &set {
         Some(set) if !credible[set.strongest] => Some(set.strongest),
-        _ => first,
+        _ => leader,
     };
     let excused = match (&set, first) {
         (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, &baseline.rest),
@@ -218,7 +218,14 @@ pub fn decide<D: Modelled>(
         None => (alone(w), w),
     };
     let reference = winner.delta_bic;
-    let weight = |c: &EffectCandidate<D>| evidence_weight(c.delta_bic - reference).min(1.0);
+    // Against rivals that small errors of the setup were fitted beside, too, the gains together with those count.
+    let weight = |c: &EffectCandidate<D>| {
+        let behind = match (gain_with_slips(winner), gain_with_slips(c)) {
+            (Some((gain, noise)), Some((other, its))) => (gain - other) / noise.min(its),
+            _ => c.delta_bic - reference,
+        };
+        evidence_weight(behind).min(1.0)
+    };
     let rivals: f64 = candidates
         .iter()
         .enumerate()
@@ -260,6 +267,27 @@ fn odds_against<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> 
         _ if c.share_explained(baseline) >= LARGE_SHARE => 0.3,
         _ => 3.0,
     }
+}
+
+/// Share of a rest up to which small errors of the setup leave next to nothing of it.
+const NEXT_TO_NOTHING: f64 = 0.1;
+
+/// Whether what a candidate leaves is, nearly all of it, what small errors of the setup do.
+pub fn mostly_slips<D: Modelled>(c: &EffectCandidate<D>) -> bool {
+    let share_left = || {
+        let rest = c.rest.as_ref()?;
+        let largest = rest.largest()?;
+        Some(rest.beyond_slips.as_ref()?.same(largest)?.excess / largest.excess)
+    };
+    share_left().is_some_and(|share| share < NEXT_TO_NOTHING)
+}
+
+/// χ² that a candidate and the small errors of the setup beside it take away, less the price of both, and the multiple of white noise
+/// that neighbouring lines have in common. `None` where such errors were sought at none of its rests, or not at this one.
+pub fn gain_with_slips<D: Modelled>(c: &EffectCandidate<D>) -> Option<(f64, f64)> {
+    let beyond = c.rest.as_ref()?.beyond_slips.as_ref()?;
+    let gain = c.gain + 2.0 * beyond.evidence - gain_by_chance(c.parameters.len());
+    Some((gain, beyond.noise_factor()))
 }
 
 /// Weight of the small errors of the setup alone against the same with effects of so many `parameters` that take `gain` of χ² away

@@ -13,6 +13,14 @@ pub fn figures(value: f64, count: i32) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A frequency in a sentence: two places, three figures below 1 Hz.
+pub fn hertz(value: f64) -> String {
+    match value.abs() < 1.0 {
+        true => figures(value, 3),
+        false => format!("{value:.2}"),
+    }
+}
+
 /// `a`, `a and b`, `a, b and c`.
 pub fn listed(items: &[String]) -> String {
     match items {

@@ -151,8 +151,10 @@ impl QualityCheck {
             return Vec::new();
         };
         let mut warnings = Vec::new();
-        for (channel, found) in record.channels.iter().zip(&self.channels) {
-            warnings.extend(found.warnings(channel, &record.channels));
+        let samples: Vec<&[f64]> = record.channels.iter().map(|c| c.samples.as_slice()).collect();
+        let hammer = signal::pulsed_channel(&samples);
+        for (k, (channel, found)) in record.channels.iter().zip(&self.channels).enumerate() {
+            warnings.extend(found.warnings(channel, &record.channels, hammer == Some(k)));
         }
         warnings.extend(far_too_small(record, &self.channels));
         warnings.extend(no_air(record));
@@ -162,7 +164,8 @@ impl QualityCheck {
 }
 
 impl Found {
-    fn warnings(&self, channel: &Channel, all: &[Channel]) -> Vec<String> {
+    /// `hammer`: its pulses are hits, not spikes.
+    fn warnings(&self, channel: &Channel, all: &[Channel], hammer: bool) -> Vec<String> {
         let (name, unit) = (&channel.name, channel.quantity_and_unit().1);
         let mut warnings = Vec::new();
         if !self.alive && self.range.is_some() {
@@ -198,7 +201,7 @@ impl Found {
                 figures(value, 4)
             ));
         }
-        if let Some((at, value, _)) = self.spikes.first {
+        if let Some((at, value, _)) = self.spikes.first.filter(|_| !hammer) {
             warnings.push(format!(
                 "{name}: {} spikes of up to three samples (the first at {at:.4} s, {} {unit}): electrical \
                  disturbance; cfc leaves them out",

@@ -121,7 +121,7 @@ pub fn parse(label: &str) -> Option<Unit> {
 /// What to say of an FRF whose unit is understood and is none of a motion per force: volts (a sensor's sensitivity was not entered),
 /// or like per like (`/` is what Testlab writes there).
 pub fn no_motion_per_force(label: &str) -> Option<String> {
-    let (above, below) = label.trim().split_once('/')?;
+    let (above, below) = above_and_below(label.trim())?;
     let volts = |part: &str| parse(part).is_some_and(|u| u.dimension == Dimension::VOLTAGE);
     if volts(above) || volts(below) {
         return Some(format!(
@@ -136,6 +136,21 @@ pub fn no_motion_per_force(label: &str) -> Option<String> {
              (transmissibility), its resonances are those of the structure held at the reference, and it has no modal masses"
         )
     })
+}
+
+/// The parts of a quotient: above and below its last stroke that is in no brackets.
+fn above_and_below(label: &str) -> Option<(&str, &str)> {
+    let mut depth = 0;
+    let mut stroke = None;
+    for (at, c) in label.char_indices() {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            '/' if depth == 0 => stroke = Some(at),
+            _ => {}
+        }
+    }
+    stroke.map(|at| (&label[..at], &label[at + 1..]))
 }
 
 /// As [`parse`], and for labels that are names with a unit at their end: `acc_m_s2`, `acc_m/s2`, `force_n`; and for such an end
@@ -376,7 +391,7 @@ mod tests {
     fn units_of_frfs_that_are_no_motion_per_force() {
         let said = |label: &str| no_motion_per_force(label).unwrap_or_default();
         // Volts per volt: two sensors without their sensitivities, as likely a hammer and a sensor as two motions.
-        for volts in ["V/N", "mV/N", "V/lbf", "V/V"] {
+        for volts in ["V/N", "mV/N", "V/lbf", "V/V", "(m/s²)/V", "m/s/V"] {
             assert!(said(volts).contains("counts in volts"), "{volts}");
         }
         for ratio in ["/", "g/g", "(m/s²)/(m/s²)"] {

@@ -10,6 +10,7 @@ pub mod delay;
 mod hits;
 mod impact_test;
 pub mod indicators;
+pub(crate) mod low_end;
 pub(crate) mod max_likelihood;
 pub mod operational;
 pub(crate) mod pole_fit;

@@ -136,7 +136,7 @@ pub fn judge(
         );
     } else {
         quality.verdict = QualityGrade::Bad;
-        quality.reasons.push("zero, or too few lines".into());
+        quality.reasons.push("no common fit, or too few lines".into());
         return quality;
     }
     if let Some(mean) = quality.coherence {
@@ -253,6 +253,8 @@ pub(super) struct SetFindings {
     pub doubts: usize,
     /// Modes that the FRFs by themselves put elsewhere than the common fit, Hz.
     pub elsewhere_hz: Vec<f64>,
+    /// Modes that are those of the FRFs by themselves, Hz.
+    pub own_hz: Vec<f64>,
     /// Clear peaks of most FRFs that are not among the modes, Hz.
     pub missed_hz: Vec<f64>,
     pub converged: bool,
@@ -326,6 +328,17 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             format!(
                 "the common fit has {} Hz elsewhere than the FRFs by themselves, which were taken: it lacks something there (a \
                  narrower --band may help)",
+                places.join(", ")
+            ),
+        );
+    }
+    if !found.own_hz.is_empty() {
+        let places: Vec<String> = found.own_hz.iter().map(|f| format!("{f:.2}")).collect();
+        note(
+            QualityGrade::Doubtful,
+            format!(
+                "the common fit has no mode at {} Hz, where the FRFs have one by themselves, which was taken (a narrower --band may \
+                 help)",
                 places.join(", ")
             ),
         );

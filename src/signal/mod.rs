@@ -11,6 +11,7 @@ mod local_rational;
 mod mains;
 pub mod noise_law;
 mod order_spectrum;
+mod pulses;
 mod spindle_track;
 mod steady_window;
 mod tooth_line;
@@ -25,6 +26,7 @@ pub use mains::{MAINS_HZ, from_mains_hz};
 pub use order_spectrum::{
     OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum, order_spectrum_above,
 };
+pub use pulses::pulsed_channel;
 pub use spindle_track::{SpindleTrack, spindle_track};
 pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

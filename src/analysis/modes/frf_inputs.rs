@@ -12,7 +12,7 @@ use crate::modal::{self, Hit, TapRecord, TapSettings};
 use crate::{Error, InputError, Result};
 
 /// How files are read that do not say all of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrfReading {
     /// What FRFs are where their file does not say.
     pub unsaid: Quantity,
@@ -25,6 +25,10 @@ pub struct FrfReading {
     pub taps: TapSettings,
     /// Sampling rate of raw records that say neither times nor a rate, Hz.
     pub rate_hz: Option<f64>,
+    /// The hammer's channel of raw records: its name, or its number among the channels from 1 on. Found where left out.
+    pub hammer: Option<String>,
+    /// What FRFs of sensors are that say no unit of motion; accelerance where left out.
+    pub sensors: Option<Quantity>,
 }
 
 /// What reading says besides the FRFs.
@@ -121,7 +125,7 @@ pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result
     }
     let mut inputs = Vec::new();
     for alike in file.contents.times.chunk_by(TimeRecord::same_channels) {
-        inputs.extend(from_segments(&set, path, alike, &reading.taps, told)?);
+        inputs.extend(from_segments(&set, path, alike, reading, told)?);
     }
     Ok(inputs)
 }
@@ -132,19 +136,19 @@ fn from_segments(
     set: &str,
     path: &Path,
     segments: &[TimeRecord],
-    taps: &TapSettings,
+    reading: &FrfReading,
     told: &mut Told,
 ) -> Result<Vec<FrfInput>> {
     let [first, others @ ..] = segments else {
         return Ok(Vec::new());
     };
     if others.is_empty() {
-        return Ok(from_taps(set, path, first, taps, told)?.frfs);
+        return Ok(from_taps(set, path, first, reading, told)?.frfs);
     }
     let mut whole = first.clone();
     others.iter().for_each(|segment| whole.append(segment));
     let mut theirs = Told::default();
-    let together = from_taps(set, path, &whole, taps, &mut theirs)?;
+    let together = from_taps(set, path, &whole, reading, &mut theirs)?;
     if !together.contradictory {
         told.warnings.push(format!(
             "{set}: {} records with the same channels: their hits are averaged",
@@ -162,7 +166,7 @@ fn from_segments(
     ));
     let mut inputs = Vec::new();
     for (k, segment) in segments.iter().enumerate() {
-        let alone = from_taps(set, path, segment, taps, told)?.frfs;
+        let alone = from_taps(set, path, segment, reading, told)?.frfs;
         inputs.extend(alone.into_iter().map(|input| FrfInput {
             name: format!("{} record {}", input.name, k + 1),
             ..input
@@ -215,9 +219,12 @@ fn dimension(channel: &Channel) -> Option<Dimension> {
     units::parse_named(&channel.file_unit).map(|u| u.dimension)
 }
 
-/// The hammer's channel: the only one in newtons, or else the only one that is called so, or else the only one that is no motion, if
-/// it is in volts.
-fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
+/// The hammer's channel: the one that was said, or the only one in newtons, or else the only one that is called so, or else the only one
+/// that is no motion, if it is in volts, or else the only one of short pulses where the others ring on.
+fn hammer<'a>(record: &'a TimeRecord, path: &Path, said: Option<&str>) -> Result<&'a Channel> {
+    if let Some(said) = said {
+        return said_hammer(record, path, said);
+    }
     let by = |test: &dyn Fn(&Channel) -> bool| -> Vec<&'a Channel> {
         record.channels.iter().filter(|c| test(c)).collect()
     };
@@ -231,24 +238,107 @@ fn hammer<'a>(record: &'a TimeRecord, path: &Path) -> Result<&'a Channel> {
     if let [one] = likely.as_slice() {
         return Ok(one);
     }
-    let others = by(&|c| dimension(c).and_then(|d| d.motion()).is_none());
+    let is_motion = |c: &Channel| dimension(c).and_then(|d| d.motion()).is_some();
+    let others = by(&|c| !is_motion(c));
     let in_volts =
         |c: &Channel| dimension(c) == Some(Dimension::VOLTAGE) && !ingest::is_called_marker(&c.name);
-    match others.as_slice() {
-        [one] if record.channels.len() > 1 && in_volts(one) => Ok(one),
-        _ => {
-            let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
-            Err(InputError::new(format!(
-                "a time record without exactly one hammer channel ({})",
-                names.join(", ")
-            ))
+    if let [one] = others.as_slice()
+        && record.channels.len() > 1
+        && in_volts(one)
+    {
+        return Ok(one);
+    }
+    let samples: Vec<&[f64]> = record.channels.iter().map(|c| c.samples.as_slice()).collect();
+    let pulsed = crate::signal::pulsed_channel(&samples).map(|k| &record.channels[k]);
+    if let Some(one) = pulsed.filter(|c| !is_motion(c) && !ingest::is_called_marker(&c.name)) {
+        return Ok(one);
+    }
+    Err(
+        InputError::new(format!("a time record without exactly one hammer channel ({})", named(record)))
             .file(path)
             .remedy(
-                "give the hammer's channel the unit N, or call it force; cutting forces go to `lobestone cfc`, motion without any \
-                 force (idling, cutting) to `lobestone modal --output-only`",
+                "say which it is (`--hammer NAME`), give it the unit N, or call it force; cutting forces go to `lobestone cfc`, \
+                 motion without any force (idling, cutting) to `lobestone modal --output-only`",
             )
-            .into())
+            .into(),
+    )
+}
+
+fn said_hammer<'a>(record: &'a TimeRecord, path: &Path, said: &str) -> Result<&'a Channel> {
+    let channels = &record.channels;
+    let by_name = channels.iter().find(|c| c.name.eq_ignore_ascii_case(said));
+    let number = || channels.get(said.parse::<usize>().ok()?.checked_sub(1)?);
+    by_name.or_else(number).ok_or_else(|| {
+        InputError::new(format!("no channel is called {said} ({})", named(record)))
+            .file(path)
+            .remedy("give the name of the hammer's channel, or its number from 1 on: `--hammer 1`")
+            .into()
+    })
+}
+
+fn named(record: &TimeRecord) -> String {
+    let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+    names.join(", ")
+}
+
+/// What each channel but the hammer's measures of the motion, as far as it does.
+fn sensors<'a>(
+    set: &str,
+    record: &'a TimeRecord,
+    hammer: &Channel,
+    reading: &FrfReading,
+    told: &mut Told,
+) -> Vec<(&'a Channel, Quantity)> {
+    let others = || record.channels.iter().filter(|c| !std::ptr::eq(*c, hammer));
+    let motion = |c: &Channel| dimension(c).and_then(|d| d.motion());
+    let blank = |c: &Channel| units::is_blank(&c.file_unit);
+    let acceleration = |c: &Channel| blank(c) && ingest::is_called_acceleration(&c.name);
+    // Where no channel says that it is one, those that may be are sensors: without a unit, or not calibrated.
+    let silent = others().all(|c| motion(c).is_none() && !acceleration(c));
+    let may_be = |c: &Channel| {
+        silent && !ingest::is_called_marker(&c.name) && (blank(c) || dimension(c) == Some(Dimension::VOLTAGE))
+    };
+    let (mut sensors, mut assumed) = (Vec::new(), Vec::new());
+    for c in others() {
+        if let Some(quantity) = motion(c) {
+            sensors.push((c, quantity));
+        } else if acceleration(c) {
+            sensors.push((c, Quantity::Accelerance));
+            told.warnings.push(format!(
+                "{set}: channel {} has no unit: taken for m/s² (another: name it {}_g)",
+                c.name, c.name
+            ));
+        } else if may_be(c) {
+            sensors.push((c, reading.sensors.unwrap_or(Quantity::Accelerance)));
+            assumed.push(c);
+        } else {
+            told.warnings.push(format!(
+                "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
+                c.name, c.file_unit
+            ));
         }
+    }
+    if let Some(first) = assumed.first() {
+        let names: Vec<String> = assumed.iter().map(|c| c.name.clone()).collect();
+        let unit = match blank(first) {
+            true => "no unit".to_owned(),
+            false => format!("the unit {}", first.file_unit),
+        };
+        told.warnings.push(format!(
+            "{set}: {} with {unit}: taken for {} as they stand (another: --quantity); frequencies and damping do not depend on the \
+             sensitivity, the size of the FRFs and modal masses do",
+            crate::text::listed(&names),
+            motion_unit(reading.sensors.unwrap_or(Quantity::Accelerance))
+        ));
+    }
+    sensors
+}
+
+fn motion_unit(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Receptance => "m",
+        Quantity::Mobility => "m/s",
+        Quantity::Accelerance => "m/s²",
     }
 }
 
@@ -256,15 +346,20 @@ fn from_taps(
     set: &str,
     path: &Path,
     record: &TimeRecord,
-    taps: &TapSettings,
+    reading: &FrfReading,
     told: &mut Told,
 ) -> Result<FromTaps> {
-    let hammer = hammer(record, path)?;
+    let hammer = hammer(record, path, reading.hammer.as_deref())?;
+    let is_known = ingest::is_called_hammer(&hammer.name) || reading.hammer.is_some();
     if units::is_blank(&hammer.file_unit) {
-        told.warnings.push(format!(
-            "{set}: the hammer's channel {} has no unit: taken for newtons",
-            hammer.name
-        ));
+        let what = match is_known {
+            true => format!("the hammer's channel {} has no unit", hammer.name),
+            false => format!(
+                "{} is taken for the hammer, as the only channel of short pulses (another: --hammer); it has no unit",
+                hammer.name
+            ),
+        };
+        told.warnings.push(format!("{set}: {what}: taken for newtons"));
     } else if dimension(hammer) != Some(Dimension::FORCE) {
         told.warnings.push(format!(
             "{set}: {} is taken for the hammer; it counts in {}, not in newtons: frequencies and damping do not depend on it, the size of the \
@@ -272,24 +367,7 @@ fn from_taps(
             hammer.name, hammer.file_unit
         ));
     }
-    let mut sensors: Vec<(&Channel, Quantity)> = Vec::new();
-    for c in record.channels.iter().filter(|c| !std::ptr::eq(*c, hammer)) {
-        let motion = units::parse_named(&c.file_unit).and_then(|u| u.dimension.motion());
-        let acceleration = units::is_blank(&c.file_unit) && ingest::is_called_acceleration(&c.name);
-        let quantity = motion.or(acceleration.then_some(Quantity::Accelerance));
-        sensors.extend(quantity.map(|q| (c, q)));
-        if acceleration {
-            told.warnings.push(format!(
-                "{set}: channel {} has no unit: taken for m/s² (another: name it {}_g)",
-                c.name, c.name
-            ));
-        } else if motion.is_none() {
-            told.warnings.push(format!(
-                "{set}: channel {} ({}) is no displacement, velocity or acceleration: left out",
-                c.name, c.file_unit
-            ));
-        }
-    }
+    let sensors = sensors(set, record, hammer, reading, told);
     if sensors.is_empty() {
         let others: Vec<&str> = record
             .channels
@@ -305,7 +383,7 @@ fn from_taps(
         .file(path)
         .remedy(
             "give the sensors' channels a unit, where the file has no place for it at the end of their name: acc_m_per_s2, acc_g, \
-             \"Acc [m/s²]\", vel_m_per_s, disp_um; a channel called acc… without a unit is taken for m/s²",
+             \"Acc [m/s²]\", vel_m_per_s, disp_um",
         )
         .into());
     }
@@ -315,7 +393,7 @@ fn from_taps(
         force_n: &hammer.samples,
         responses: &responses,
     };
-    let found = match modal::impact_test(&tap, taps) {
+    let found = match modal::impact_test(&tap, &reading.taps) {
         Ok(found) => found,
         Err(Error::Input(why)) => {
             told.warnings.push(format!("{set}: left out: {}", why.problem));
@@ -477,13 +555,38 @@ mod tests {
             assert_eq!(count.unwrap(), 1, "{names}");
             assert!(told.contains("counts in V, not in newtons"), "{names}: {told}");
         }
-        assert!(of("time,a [V],b [V]").0.is_err());
         assert!(of("time,Tacho [V],CH2 [cm/s2]").0.is_err());
-        let error = of("time,force,x").0.unwrap_err().to_string();
+        let error = of("time,force,temperature [°C]").0.unwrap_err().to_string();
         assert!(
-            error.contains("others: x") && error.contains("acc_m_per_s2"),
+            error.contains("others: temperature") && error.contains("acc_m_per_s2"),
             "{error}"
         );
+        // Nothing says anything: the hammer is what holds short pulses while the other rings on.
+        for names in ["time,f,x", "time,a [V],b [V]"] {
+            let (count, told) = of(names);
+            assert_eq!(count.unwrap(), 1, "{names}");
+            assert!(
+                told.contains("taken for the hammer") && told.contains("taken for m/s²"),
+                "{names}: {told}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_hammer_may_be_said() {
+        let file = record("time,out [V],in [V]", 10.0);
+        let of = |hammer: &str| {
+            let reading = FrfReading {
+                hammer: Some(hammer.into()),
+                ..FrfReading::default()
+            };
+            read(file.path(), &reading, &mut Told::default())
+        };
+        for said in ["out", "1"] {
+            assert_eq!(of(said).unwrap()[0].name, "in/out");
+        }
+        let error = of("force").unwrap_err().to_string();
+        assert!(error.contains("no channel is called force (out, in)"), "{error}");
     }
 
     #[test]

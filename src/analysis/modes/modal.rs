@@ -90,7 +90,7 @@ impl ModalAnalysis {
         reading: &FrfReading,
         settings: &Settings,
     ) -> Result<Self> {
-        let mut reading = *reading;
+        let mut reading = reading.clone();
         reading.taps.band_hz = reading.taps.band_hz.or(settings.band_hz);
         let mut inputs = Vec::new();
         let mut told = Told::default();

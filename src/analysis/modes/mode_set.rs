@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::modal::delay::{self, Delay};
+use crate::modal::low_end;
 use crate::modal::quality::{self, Quality, QualityGrade};
 use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
 
@@ -76,11 +77,19 @@ pub fn dofs_of_frfs(set: &SetModes) -> Vec<Option<[usize; 2]>> {
 /// Frequencies that are not ascending.
 pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Settings) -> Result<SetModes> {
     let sines = sines_of(&inputs);
+    // Who asks for a band has it.
+    let sound_hz = match settings.band_hz {
+        Some(_) => vec![None; inputs.len()],
+        None => sound_from_hz(&inputs),
+    };
     #[allow(clippy::type_complexity)]
     let clean: Vec<(Cow<[f64]>, Cow<[Complex64]>)> = inputs
         .iter()
-        .map(|input| {
+        .zip(&sound_hz)
+        .map(|(input, sound_hz)| {
             let (f, h) = (&input.frequency_hz[..], &input.receptance_m_per_n[..]);
+            let from = sound_hz.map_or(0, |sound| f.partition_point(|f| *f < sound));
+            let (f, h) = (&f[from..], &h[from..]);
             if sines.is_empty() {
                 return (Cow::Borrowed(f), Cow::Borrowed(h));
             }
@@ -114,6 +123,12 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         .collect();
     let mut global = modal::global(&members, settings)?;
     global.warnings.extend(shorter_bands(&inputs, settings.band_hz));
+    if let Some(highest) = sound_hz.iter().flatten().copied().reduce(f64::max) {
+        global.warnings.push(format!(
+            "the lines below {highest:.2} Hz scatter by as much as they are large (below what the sensor measures or the force excites): \
+             left out (a --band takes them)"
+        ));
+    }
     if !sines.is_empty() {
         let told: Vec<String> = sines
             .iter()
@@ -226,6 +241,28 @@ fn shorter_bands(inputs: &[FrfInput], band_hz: Option<[f64; 2]>) -> Option<Strin
             shorter[..shorter.len().min(MOST_NAMES)].join(", ")
         )
     })
+}
+
+/// By FRF, the frequency from which on its lines are more than rubbish, Hz; `None` where the lowest are as good as the others.
+fn sound_from_hz(inputs: &[FrfInput]) -> Vec<Option<f64>> {
+    let mut sound_hz = vec![None; inputs.len()];
+    let mut todo: Vec<usize> = (0..inputs.len()).collect();
+    while let Some(&first) = todo.first() {
+        let lines_hz = &inputs[first].frequency_hz;
+        let (same, other): (Vec<usize>, Vec<usize>) =
+            todo.iter().partition(|&&k| inputs[k].frequency_hz == *lines_hz);
+        let curves: Vec<&[Complex64]> = same
+            .iter()
+            .map(|&k| inputs[k].receptance_m_per_n.as_slice())
+            .collect();
+        let line = low_end::first_sound_line(lines_hz, &curves);
+        if line > lines_hz.partition_point(|f| *f <= 0.0) {
+            same.iter()
+                .for_each(|&k| sound_hz[k] = lines_hz.get(line).copied());
+        }
+        todo = other;
+    }
+    sound_hz
 }
 
 /// Sines among FRFs that share their lines.

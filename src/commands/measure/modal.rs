@@ -18,6 +18,7 @@ use crate::data::Quantity;
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
 use crate::modal::{Estimator, FrfMode, Method, Settings, TapSettings, Tolerances};
+use crate::text::hertz;
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -46,6 +47,9 @@ pub struct ModalArgs {
     /// Records without a time column (tap tests, responses alone): sampling rate, Hz.
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
+    /// Tap tests: the hammer's channel, by its name or its number among the channels (found by its unit, name or pulses where left out).
+    #[arg(long, value_name = "CHANNEL", conflicts_with = "output_only")]
+    hammer: Option<String>,
     /// The files are records of responses without forces (idling, cutting): modes from them alone.
     #[arg(long, conflicts_with_all = ["together", "each", "block_s"])]
     output_only: bool,
@@ -208,6 +212,8 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
                 added_decay_per_s: args.window_tau.map_or(0.0, |tau| 1.0 / tau),
                 taps,
                 rate_hz: args.rate,
+                hammer: args.hammer.clone(),
+                sensors: args.quantity,
             };
             let analysis = ModalAnalysis::of_files(files, args.together, &reading, &settings)?;
             let paths: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
@@ -378,8 +384,9 @@ fn tracked(analysis: &ModalAnalysis) -> String {
     let cell = |set: &SetModes, mode: Option<usize>| {
         mode.map_or("–".to_owned(), |k| {
             let m = &set.global.modes[k];
+            let places = places(std::iter::once(m.frequency_hz));
             format!(
-                "{:.3}±{:.3} Hz {:.2}±{:.2} %",
+                "{:.places$}±{:.places$} Hz {:.2}±{:.2} %",
                 m.frequency_hz,
                 m.frequency_std_hz,
                 100.0 * m.damping_ratio,
@@ -431,22 +438,28 @@ fn text(analysis: &ModalAnalysis, each: bool) -> String {
     for set in &analysis.sets {
         let _ = writeln!(out, "\n{}: all FRFs together ({})", set.set, set.why);
         let _ = writeln!(out, "      f Hz      ±     ζ %      ±  found in  collinear");
+        let places = places(set.global.modes.iter().map(|m| m.frequency_hz));
         for mode in &set.global.modes {
             let collinear = mode.complexity.map_or("–".into(), |c| {
                 format!("{:.3}{}", c.mpc, if c.is_low() { " complex" } else { "" })
             });
             let _ = writeln!(
                 out,
-                "  {:8.3} {} {:7.3} {}  {:<8}  {collinear}",
+                "  {:8.places$} {} {:7.3} {}  {:<8}  {collinear}",
                 mode.frequency_hz,
-                deviation(Some(mode.frequency_std_hz), 1.0),
+                deviation(Some(mode.frequency_std_hz), places),
                 100.0 * mode.damping_ratio,
-                deviation(Some(mode.damping_std), 100.0),
+                deviation(Some(100.0 * mode.damping_std), PLACES),
                 mode.found_in,
             );
         }
         for pole in set.global.rejected.iter().take(FEW_REJECTED) {
-            let _ = writeln!(out, "    no mode: {:.2} Hz, {}", pole.frequency_hz, pole.reason);
+            let _ = writeln!(
+                out,
+                "    no mode: {} Hz, {}",
+                hertz(pole.frequency_hz),
+                pole.reason
+            );
         }
         let more = set.global.rejected.len().saturating_sub(FEW_REJECTED);
         if more > 0 {
@@ -482,6 +495,7 @@ fn single(set: &SetModes, out: &mut String) {
             continue;
         }
         let _ = writeln!(out, "      f Hz      ±     ζ %      ±  method      lines in band");
+        let places = places(frf.modes.modes.iter().map(|m| m.best().frequency_hz));
         for mode in &frf.modes.modes {
             for (k, e) in mode.estimates.iter().enumerate() {
                 let lines = if k == 0 {
@@ -491,11 +505,11 @@ fn single(set: &SetModes, out: &mut String) {
                 };
                 let _ = writeln!(
                     out,
-                    "  {:8.3} {} {:7.3} {}  {:<10}  {lines}",
+                    "  {:8.places$} {} {:7.3} {}  {:<10}  {lines}",
                     e.frequency_hz,
-                    deviation(e.frequency_std_hz, 1.0),
+                    deviation(e.frequency_std_hz, places),
                     100.0 * e.damping_ratio,
-                    deviation(e.damping_std, 100.0),
+                    deviation(e.damping_std.map(|s| 100.0 * s), PLACES),
                     e.method.id(),
                 );
             }
@@ -504,6 +518,20 @@ fn single(set: &SetModes, out: &mut String) {
     }
 }
 
-fn deviation(std: Option<f64>, scale: f64) -> String {
-    std.map_or("     –".into(), |s| format!("{:6.3}", s * scale))
+/// Places behind the point of a table, of most tables.
+const PLACES: usize = 3;
+
+/// Places that show five figures of the lowest frequency of a table, Hz.
+fn places(frequencies_hz: impl Iterator<Item = f64>) -> usize {
+    let lowest = frequencies_hz.filter(|f| *f > 0.0).fold(f64::INFINITY, f64::min);
+    let wanted = if lowest.is_finite() {
+        4.0 - lowest.log10().floor()
+    } else {
+        0.0
+    };
+    (wanted as usize).clamp(PLACES, 8)
+}
+
+fn deviation(std: Option<f64>, places: usize) -> String {
+    std.map_or("     –".into(), |s| format!("{s:6.places$}"))
 }

@@ -93,8 +93,9 @@ pub fn text(sets: &[OperationalSet]) -> String {
         for rejected in found.rejected.iter().take(MOST_REJECTED) {
             let _ = writeln!(
                 out,
-                "    not taken: {:.2} Hz, {}",
-                rejected.frequency_hz, rejected.reason
+                "    not taken: {} Hz, {}",
+                crate::text::hertz(rejected.frequency_hz),
+                rejected.reason
             );
         }
         if found.rejected.len() > MOST_REJECTED {

@@ -12,6 +12,11 @@ use crate::modal::stabilisation::MAX_DAMPING;
 
 /// Modes refined together at most: the normal equations grow with the square.
 const MAX_GROUP: usize = 12;
+/// Neighbours further apart than this ratio of their frequencies are fitted apart, each with the other held: over so wide a window the
+/// residual terms are neither exact nor well conditioned.
+const FAR_APART: f64 = 3.0;
+/// Lines beyond this ratio to the lowest and the highest pole of a group say nothing of its poles, however large they are.
+const REACH: f64 = 8.0;
 /// Neighbours beyond a group's edge that take part with fixed poles.
 const FIXED_NEIGHBOURS: usize = 3;
 const MAX_ADDED: usize = 4;
@@ -34,6 +39,8 @@ const SAME_PLACE: f64 = 0.05;
 const MERGED: [f64; 3] = [0.5, 1.0, 2.0];
 /// Trial poles spread over a window, of each damping.
 const TRIALS: usize = 24;
+/// So many of them tell what chance brings around a pole.
+const NEARBY_TRIALS: usize = 8;
 /// Damping of the trial poles over the usual one.
 const WIDER: [f64; 2] = [1.0, 3.0];
 /// A trial pole that is damped more would explain what modes do.
@@ -130,41 +137,55 @@ pub(crate) fn refine(
 ) -> Option<Vec<Group>> {
     // A pole can have run onto one of the next group.
     let candidates = &apart(candidates, SAME_PLACE)[..];
-    let groups = groups(candidates);
-    let middle = |a: &[Pole], b: &[Pole]| Some(0.5 * (a.last()?.frequency_hz + b.first()?.frequency_hz));
-    let mut result = Vec::with_capacity(groups.len());
-    let mut before = 0;
-    for (g, group) in groups.iter().enumerate() {
-        let low = if g == 0 {
-            0.0
+    let middle = |at: usize| 0.5 * (candidates[at - 1].frequency_hz + candidates[at].frequency_hz);
+    let mut ends: Vec<usize> = groups(candidates)
+        .iter()
+        .scan(0, |end, group| {
+            *end += group.len();
+            Some(*end)
+        })
+        .collect();
+    let mut result = Vec::with_capacity(ends.len());
+    let (mut g, mut before) = (0, 0);
+    while g < ends.len() {
+        let after = ends[g];
+        let group = &candidates[before..after];
+        let first = group.first().map_or(0.0, |p| p.frequency_hz);
+        let last = group.last().map_or(f64::INFINITY, |p| p.frequency_hz);
+        let low = if before == 0 { 0.0 } else { middle(before) };
+        let high = if after == candidates.len() {
+            f64::INFINITY
         } else {
-            middle(groups[g - 1], group)?
+            middle(after)
         };
-        let high = groups
-            .get(g + 1)
-            .map_or(Some(f64::INFINITY), |next| middle(group, next))?;
-        let after = before + group.len();
         let fixed: Vec<Pole> = candidates[before.saturating_sub(FIXED_NEIGHBOURS)..before]
             .iter()
             .chain(&candidates[after..(after + FIXED_NEIGHBOURS).min(candidates.len())])
             .copied()
             .collect();
-        let window_hz = [low, high];
-        before = after;
+        let window_hz = [low.max(first / REACH), high.min(last * REACH)];
         let mut fit = PoleGroup {
             frfs: data.iter().map(|d| d.window(window_hz)).collect(),
             fixed,
             search,
-            chance: 1.0,
+            chance: Chance::default(),
         };
         // Poles that the lines do not tell apart (one mode that moves from FRF to FRF can have split) are too many.
         let Some(mut solution) = fit
             .fit(group)
             .or_else(|| MERGED.into_iter().find_map(|share| fit.fit(&apart(group, share))))
         else {
-            changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
+            // In two parts, or one that cannot be fitted costs all the others.
+            match widest_gap(group, 0) {
+                Some((at, _)) => ends.insert(g, before + at),
+                None => {
+                    changes.extend(group.iter().map(|pole| Change::NotDetermined(*pole)));
+                    (g, before) = (g + 1, after);
+                }
+            }
             continue;
         };
+        (g, before) = (g + 1, after);
         if search != PoleSearch::Roughly && !solution.poles.is_empty() {
             fit.chance = fit.by_chance(&solution);
         }
@@ -186,7 +207,7 @@ pub(crate) fn refine(
             window_hz,
             solution,
             doubt,
-            chance: fit.chance,
+            chance: fit.chance.overall,
         });
     }
     (!result.is_empty()).then_some(result)
@@ -207,28 +228,34 @@ fn apart(group: &[Pole], share: f64) -> Vec<Pole> {
     kept
 }
 
-/// Splits at the widest gaps until no group is too large.
+/// Splits at the widest gaps until no group is too large and no neighbours in one are far apart.
 fn groups(candidates: &[Pole]) -> Vec<&[Pole]> {
     let mut todo = vec![candidates];
     let mut done = Vec::new();
     while let Some(group) = todo.pop() {
-        if group.len() <= MAX_GROUP {
-            done.push(group);
-            continue;
-        }
+        let too_large = group.len() > MAX_GROUP;
         // Not at the very ends, or a hundred modes would make a hundred groups.
-        let quarter = group.len() / 4;
-        let at = (quarter.max(1)..group.len() - quarter)
-            .max_by(|&a, &b| {
-                let gap = |k: usize| (group[k].frequency_hz / group[k - 1].frequency_hz).ln();
-                gap(a).total_cmp(&gap(b))
-            })
-            .unwrap_or(group.len() / 2);
+        let from_ends = if too_large { group.len() / 4 } else { 0 };
+        let at = match widest_gap(group, from_ends) {
+            Some((at, ratio)) if too_large || ratio > FAR_APART => at,
+            _ => {
+                done.push(group);
+                continue;
+            }
+        };
         let (below, above) = group.split_at(at);
         todo.push(above);
         todo.push(below);
     }
     done
+}
+
+/// Where neighbours are furthest apart by the ratio of their frequencies, and that ratio; at least `from_ends` poles on either side.
+fn widest_gap(group: &[Pole], from_ends: usize) -> Option<(usize, f64)> {
+    let ratio = |k: usize| group[k].frequency_hz / group[k - 1].frequency_hz;
+    (from_ends.max(1)..(group.len() - from_ends).max(1))
+        .map(|k| (k, ratio(k)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// What each candidate explains over what it would have to explain to be a mode (above 1: it is one), with the poles
@@ -300,13 +327,16 @@ fn anywhere(frfs: &[NoisyFrf], damping: f64) -> Vec<Pole> {
 
 /// What any pole explains, over what it would explain of white noise of the size assumed; at least 1.
 fn chance(explained: &[f64], frfs: usize) -> f64 {
-    // Median of a chi-squared variable (Wilson & Hilferty 1931).
-    let k = 2.0 * frfs as f64;
-    let of_white = k * (1.0 - 2.0 / (9.0 * k)).powi(3);
     explained
         .chunks(TRIALS)
-        .map(|of_damping| crate::signal::median(of_damping) / of_white)
+        .map(|of_damping| crate::signal::median(of_damping) / median_of_white(frfs))
         .fold(1.0, f64::max)
+}
+
+/// Median of what a pole explains of white noise: of a chi-squared variable (Wilson & Hilferty 1931).
+fn median_of_white(frfs: usize) -> f64 {
+    let k = 2.0 * frfs as f64;
+    k * (1.0 - 2.0 / (9.0 * k)).powi(3)
 }
 
 /// Misfit that a mode must explain beyond what chance gives to any pole.
@@ -315,13 +345,52 @@ fn enough(frfs: usize, chance: f64, sigma: f64, looked: f64) -> f64 {
     chance * (k + sigma * (2.0 * k).sqrt() + looked)
 }
 
+/// What poles anywhere in a window explain.
+struct Chance {
+    /// See [`chance`].
+    overall: f64,
+    /// Of the trial poles of each damping ([`WIDER`]), in ascending frequency, over what they would explain of white noise.
+    explained: Vec<f64>,
+    /// Their frequencies, Hz.
+    trial_hz: Vec<f64>,
+}
+
+impl Default for Chance {
+    fn default() -> Self {
+        Chance {
+            overall: 1.0,
+            explained: Vec::new(),
+            trial_hz: Vec::new(),
+        }
+    }
+}
+
+impl Chance {
+    /// The stretch of the trial poles nearest to a frequency, Hz, and what these explain (as [`chance`]).
+    fn around(&self, frequency_hz: f64) -> Option<([f64; 2], f64)> {
+        let trials = self.trial_hz.len();
+        let from = self.trial_hz.partition_point(|hz| *hz < frequency_hz);
+        let from = from
+            .saturating_sub(NEARBY_TRIALS / 2)
+            .min(trials.checked_sub(NEARBY_TRIALS)?);
+        let near = from..from + NEARBY_TRIALS;
+        let explained = self
+            .explained
+            .chunks(trials)
+            .map(|of_damping| crate::signal::median(&of_damping[near.clone()]))
+            .fold(1.0, f64::max);
+        let half = 0.5 * (self.trial_hz[1] - self.trial_hz[0]);
+        let stretch_hz = [self.trial_hz[from] - half, self.trial_hz[near.end - 1] + half];
+        Some((stretch_hz, explained))
+    }
+}
+
 /// A group of poles and the lines that it is fitted to.
 pub(super) struct PoleGroup<'a> {
     pub(super) frfs: Vec<NoisyFrf<'a>>,
     fixed: Vec<Pole>,
     search: PoleSearch,
-    /// See [`chance`].
-    chance: f64,
+    chance: Chance,
 }
 
 impl PoleGroup<'_> {
@@ -341,15 +410,55 @@ impl PoleGroup<'_> {
         self.beyond_chance(solution, CHANCE_SIGMA, LOOKED_EVERYWHERE)
     }
 
-    fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
-        let level = solution.misfit / solution.degrees_of_freedom as f64;
-        enough(solution.taking_part(), level.max(self.chance), sigma, looked)
+    /// As [`wanted`](Self::wanted), for a pole of the fit: by what is left around it where that is less than elsewhere. A stretch that
+    /// no poles describe (beyond what the hammer excites, a bad channel) must not decide what is needless far from it.
+    pub(super) fn wanted_of(&self, solution: &Solution, pole: Pole) -> f64 {
+        let anywhere = self.wanted(solution);
+        let Some((stretch_hz, chance)) = self.chance.around(pole.frequency_hz) else {
+            return anywhere;
+        };
+        let level = self.level_within(solution, stretch_hz).max(chance);
+        anywhere.min(enough(
+            solution.taking_part(),
+            level,
+            CHANCE_SIGMA,
+            LOOKED_EVERYWHERE,
+        ))
     }
 
-    fn by_chance(&self, solution: &Solution) -> f64 {
+    /// What the fit leaves on the lines of a stretch, over what noise would.
+    fn level_within(&self, solution: &Solution, [low, high]: [f64; 2]) -> f64 {
+        let (mut left, mut expected) = (0.0, 0.0);
+        for (frf, found) in self.frfs.iter().zip(&solution.frfs) {
+            for ((f, sigma), residual) in frf.frequency_hz.iter().zip(frf.sigma).zip(&found.residual) {
+                if (low..=high).contains(f) {
+                    left += (residual / sigma).norm_sqr();
+                    expected += 1.0 - found.leverage;
+                }
+            }
+        }
+        if expected > 0.0 { left / expected } else { 1.0 }
+    }
+
+    fn beyond_chance(&self, solution: &Solution, sigma: f64, looked: f64) -> f64 {
+        let level = solution.misfit / solution.degrees_of_freedom as f64;
+        enough(
+            solution.taking_part(),
+            level.max(self.chance.overall),
+            sigma,
+            looked,
+        )
+    }
+
+    fn by_chance(&self, solution: &Solution) -> Chance {
         let held: Vec<Pole> = solution.poles.iter().chain(&self.fixed).copied().collect();
         let trials = anywhere(&self.frfs, usual_damping(solution));
-        ml_fit::explained_by(&self.frfs, &held, &trials).map_or(1.0, |e| chance(&e, solution.taking_part()))
+        let frfs = solution.taking_part();
+        ml_fit::explained_by(&self.frfs, &held, &trials).map_or_else(Chance::default, |explained| Chance {
+            overall: chance(&explained, frfs),
+            explained: explained.iter().map(|e| e / median_of_white(frfs)).collect(),
+            trial_hz: trials[..TRIALS].iter().map(|p| p.frequency_hz).collect(),
+        })
     }
 
     fn line_hz(&self, frequency_hz: f64) -> f64 {
@@ -543,4 +652,50 @@ pub(crate) fn spacing_hz(frequency_hz: &[f64], at_hz: f64) -> f64 {
     }
     let k = frequency_hz.partition_point(|&f| f < at_hz).clamp(1, n - 1);
     frequency_hz[k] - frequency_hz[k - 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poles_far_apart_are_fitted_apart() {
+        let poles = |frequencies: &[f64]| -> Vec<Pole> {
+            let pole = |&frequency_hz: &f64| Pole {
+                frequency_hz,
+                damping_ratio: 0.01,
+            };
+            frequencies.iter().map(pole).collect()
+        };
+        let lengths = |frequencies: &[f64]| -> Vec<usize> {
+            groups(&poles(frequencies))
+                .iter()
+                .map(|group| group.len())
+                .collect()
+        };
+        assert_eq!(lengths(&[10.0, 12.0, 100.0, 110.0, 250.0, 2000.0]), [2, 3, 1]);
+        assert_eq!(lengths(&[10.0, 29.0, 80.0]), [3]);
+        // Too many for one group: at the widest gap that is not at the ends.
+        let many: Vec<f64> = (0..14)
+            .map(|k| if k < 6 { 10.0 } else { 11.0 } + 0.01 * f64::from(k))
+            .collect();
+        assert_eq!(lengths(&many), [6, 8]);
+        assert_eq!(lengths(&[]), [0]);
+        assert_eq!(widest_gap(&poles(&[10.0]), 0), None);
+    }
+
+    /// A stretch that no poles describe decides what chance brings there, and not far from it.
+    #[test]
+    fn what_chance_brings_is_that_of_the_neighbourhood() {
+        let explained = (0..2 * TRIALS).map(|k| if k % TRIALS < TRIALS / 2 { 1.2 } else { 400.0 });
+        let chance = Chance {
+            overall: 200.0,
+            explained: explained.collect(),
+            trial_hz: (0..TRIALS).map(|k| 5.0 + 10.0 * k as f64).collect(),
+        };
+        let around = |f: f64| chance.around(f).unwrap();
+        assert_eq!(around(12.0), ([0.0, 80.0], 1.2));
+        assert_eq!(around(1e4), ([160.0, 240.0], 400.0));
+        assert!(Chance::default().around(10.0).is_none());
+    }
 }

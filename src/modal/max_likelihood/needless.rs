@@ -18,6 +18,8 @@ struct Evidence {
     sane: bool,
     /// Growth of the misfit without it, the other poles held.
     evidence: f64,
+    /// What it must explain.
+    wanted: f64,
 }
 
 impl Evidence {
@@ -42,7 +44,6 @@ impl PoleGroup<'_> {
 
     /// The pole that is needed least, if it is not needed, and the fit without it.
     fn needless(&self, solution: &Solution) -> Option<(Change, Solution)> {
-        let wanted = self.wanted(solution);
         let poles = solution.poles.iter().enumerate().map(|(j, &pole)| {
             let possible = self.possible(pole);
             Evidence {
@@ -50,6 +51,7 @@ impl PoleGroup<'_> {
                 possible,
                 sane: possible && self.determined(solution, j),
                 evidence: (0..self.frfs.len()).map(|m| solution.evidence(m, j)).sum(),
+                wanted: self.wanted_of(solution, pole),
             }
         });
         let poles: Vec<Evidence> = poles.collect();
@@ -61,7 +63,7 @@ impl PoleGroup<'_> {
         // With the other poles held the growth is an upper bound of the true one: what is needless by that is so without a
         // fit, and one fit is enough to take out the least of them.
         let certainly = (0..poles.len())
-            .filter(|&j| poles[j].evidence < wanted)
+            .filter(|&j| poles[j].evidence < poles[j].wanted)
             .min_by(|&a, &b| {
                 let key = |j: usize| (poles[j].sane, poles[j].evidence);
                 let ((a_sane, a), (b_sane, b)) = (key(a), key(b));
@@ -74,6 +76,7 @@ impl PoleGroup<'_> {
         }
         let mut least: Option<(f64, usize, Solution)> = None;
         for (j, of_pole) in poles.iter().enumerate() {
+            let wanted = of_pole.wanted;
             if of_pole.sane && of_pole.evidence > BEYOND_DOUBT * wanted {
                 continue;
             }

@@ -60,6 +60,8 @@ const MOST_DAMPED: f64 = 5.0;
 const MOST_WEIGHT: f64 = 50.0;
 /// What turns the wrong way weighs so many times the rest before a whole FRF is taken to be conjugated, which is rare.
 const CONJUGATED: f64 = 2.0;
+/// FRFs that so many peaks say to be conjugated are so whatever the others are; of fewer, noise may have turned the one that counts.
+const OWN_WORD: usize = 3;
 /// A peak that rises by less than this part of its height is a ripple.
 const RIPPLE: f64 = 0.5;
 /// Modes nearer to each other than this many sums of their half-widths overlap.
@@ -86,9 +88,29 @@ where
     let lines = || frfs.iter().map(|(f, _)| f.as_ref().len()).sum::<usize>();
     let many = frfs.len() > MANY_FRFS || (frfs.len() >= SET && lines() > MANY_LINES);
     let effort = if many { BRIEF } else { FULL };
-    frfs.par_iter()
-        .map(|(f, h)| analyse(f.as_ref(), h.as_ref(), settings, effort))
-        .collect()
+    let ready: Vec<Ready> = frfs
+        .par_iter()
+        .map(|(f, h)| Ready::new(f.as_ref(), h.as_ref(), settings))
+        .collect::<Result<_>>()?;
+    // One analyser counts the phases of all its FRFs in one way.
+    let all = ready
+        .iter()
+        .fold(Turning::default(), |sum, r| sum.with(&r.turning));
+    let conjugated: Vec<bool> = ready
+        .iter()
+        .map(|r| {
+            let own = r.turning.is_conjugated();
+            match own == all.is_conjugated() || r.turning.peaks[usize::from(own)] >= OWN_WORD {
+                true => own,
+                false => !own,
+            }
+        })
+        .collect();
+    Ok(ready
+        .into_par_iter()
+        .zip(conjugated)
+        .map(|(ready, conjugated)| analyse(ready, conjugated, effort))
+        .collect())
 }
 
 /// Finds the modes of one FRF.
@@ -104,17 +126,92 @@ pub fn analyse_frf(
     receptance_m_per_n: &[Complex64],
     settings: &Settings,
 ) -> Result<FrfModes> {
-    analyse(frequency_hz, receptance_m_per_n, settings, FULL)
+    let ready = Ready::new(frequency_hz, receptance_m_per_n, settings)?;
+    let conjugated = ready.turning.is_conjugated();
+    Ok(analyse(ready, conjugated, FULL))
 }
 
-fn analyse(
-    frequency_hz: &[f64],
-    receptance_m_per_n: &[Complex64],
-    settings: &Settings,
-    effort: Effort,
-) -> Result<FrfModes> {
-    let mut curve = Curve::from_receptance(frequency_hz, receptance_m_per_n, settings.band_hz)?;
-    let mut result = FrfModes::default();
+/// An FRF with its peaks, and which way each turns (`None` where noise hides it; true: the wrong way).
+struct Ready {
+    curve: Curve,
+    noise_std: Vec<f64>,
+    peaks: Vec<FrfPeak>,
+    backwards: Vec<Option<bool>>,
+    turning: Turning,
+}
+
+impl Ready {
+    fn new(frequency_hz: &[f64], receptance_m_per_n: &[Complex64], settings: &Settings) -> Result<Ready> {
+        let curve = Curve::from_receptance(frequency_hz, receptance_m_per_n, settings.band_hz)?;
+        let (mut noise_std, mut peaks) = (Vec::new(), Vec::new());
+        if curve.len() >= MIN_LINES {
+            noise_std = curve.noise_std();
+            peaks = peaks::find(&curve, &noise_std);
+        }
+        let backwards: Vec<Option<bool>> = peaks
+            .iter()
+            .map(|p| {
+                let lines = p.from.saturating_sub(1)..(p.to + 2).min(curve.len());
+                circle_fit::turns_backwards(&curve, lines, noise_std[p.index])
+            })
+            .collect();
+        let turning = Turning::of(&peaks, &backwards);
+        Ok(Ready {
+            curve,
+            noise_std,
+            peaks,
+            backwards,
+            turning,
+        })
+    }
+}
+
+/// Which way the peaks of an FRF turn: those that turn as they must first, then those that turn the wrong way.
+#[derive(Debug, Clone, Copy, Default)]
+struct Turning {
+    /// The resonances tell, not the ripples between them, however many those are: each by its height over what is around it.
+    weight: [f64; 2],
+    /// How many rise out of what is around them.
+    peaks: [usize; 2],
+}
+
+impl Turning {
+    fn of(peaks: &[FrfPeak], backwards: &[Option<bool>]) -> Turning {
+        let mut turning = Turning::default();
+        for (p, sense) in peaks.iter().zip(backwards) {
+            if let Some(wrong) = sense.map(usize::from) {
+                turning.weight[wrong] += (1.0 - p.rise).recip().min(MOST_WEIGHT);
+                turning.peaks[wrong] += usize::from(p.rise >= RIPPLE);
+            }
+        }
+        turning
+    }
+
+    fn with(self, other: &Turning) -> Turning {
+        Turning {
+            weight: [0, 1].map(|k| self.weight[k] + other.weight[k]),
+            peaks: [0, 1].map(|k| self.peaks[k] + other.peaks[k]),
+        }
+    }
+
+    /// The highest peak alone does not say so: a mode on two or three noisy lines turns as it likes.
+    fn is_conjugated(&self) -> bool {
+        self.weight[1] > CONJUGATED * self.weight[0] && self.peaks[1] >= self.peaks[0]
+    }
+}
+
+fn analyse(ready: Ready, conjugated: bool, effort: Effort) -> FrfModes {
+    let Ready {
+        mut curve,
+        noise_std,
+        mut peaks,
+        backwards,
+        ..
+    } = ready;
+    let mut result = FrfModes {
+        conjugated,
+        ..FrfModes::default()
+    };
     if curve.dropped > 0 {
         result.warnings.push(format!(
             "{} lines are not finite and were left out",
@@ -126,26 +223,8 @@ fn analyse(
             "only {} usable lines in the band: no modes can be found (at least {MIN_LINES} are needed)",
             curve.len()
         ));
-        return Ok(result);
+        return result;
     }
-    let noise_std = curve.noise_std();
-    let mut peaks = peaks::find(&curve, &noise_std);
-
-    let backwards: Vec<Option<bool>> = peaks
-        .iter()
-        .map(|p| {
-            let lines = p.from.saturating_sub(1)..(p.to + 2).min(curve.len());
-            circle_fit::turns_backwards(&curve, lines, noise_std[p.index])
-        })
-        .collect();
-    // The resonances tell, not the ripples between them, however many those are.
-    let weight = |sense| -> f64 {
-        let of_sense = peaks.iter().zip(&backwards).filter(|(_, b)| **b == Some(sense));
-        of_sense
-            .map(|(p, _)| (1.0 - p.rise).recip().min(MOST_WEIGHT))
-            .sum()
-    };
-    result.conjugated = weight(true) > CONJUGATED * weight(false);
     if result.conjugated {
         curve.conjugate();
         result.warnings.push(
@@ -210,7 +289,7 @@ fn analyse(
             .push(format!("peaks not reported as modes: {}", refused.join(", ")));
     }
     quality_remarks(&result.modes, &mut result.remarks);
-    Ok(result)
+    result
 }
 
 /// What the lines leave open of a mode, all that is known of its errors put together, where that is too much to call it one.

@@ -48,6 +48,39 @@ fn a_conjugated_frf_is_turned_and_that_is_said() {
     }
 }
 
+/// A mode on two or three noisy lines may turn as it likes, and be the highest of all: the others know better, in the same FRF and in
+/// those beside it.
+#[test]
+fn one_badly_measured_mode_does_not_conjugate_an_frf() {
+    let wrong = |f: f64, constant: f64| SyntheticMode::new(f, -0.004, constant);
+    let frf = |modes: &[SyntheticMode]| {
+        Synthetic::new(3.0, 90.0, 0.1, modes)
+            .with_noise(0.0, 0.005, 3)
+            .frf()
+    };
+    let with_it: Vec<SyntheticMode> = MODES.into_iter().chain([wrong(5.0, 0.05)]).collect();
+    let (f, h) = frf(&with_it);
+    assert!(!analyse_frf(&f, &h, &Settings::default()).unwrap().conjugated);
+    // Alone it has nothing to say against it.
+    let alone = frf(&[wrong(5.0, 0.05)]);
+    assert!(
+        analyse_frf(&alone.0, &alone.1, &Settings::default())
+            .unwrap()
+            .conjugated
+    );
+    let beside = analyse_frfs(&[alone, frf(&MODES)], &Settings::default()).unwrap();
+    assert!(beside.iter().all(|modes| !modes.conjugated));
+    // A whole FRF of another convention keeps its word.
+    let (f, mut h) = frf(&MODES);
+    let straight = (f.clone(), h.clone());
+    h.iter_mut().for_each(|h| *h = h.conj());
+    let mixed = analyse_frfs(&[straight.clone(), (f, h), straight], &Settings::default()).unwrap();
+    assert_eq!(
+        mixed.iter().map(|m| m.conjugated).collect::<Vec<_>>(),
+        [false, true, false]
+    );
+}
+
 #[test]
 fn a_mode_of_negative_damping_is_named_and_left_out() {
     let unstable = SyntheticMode::new(25.0, -0.02, 0.01);

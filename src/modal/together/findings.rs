@@ -34,6 +34,10 @@ const NOWHERE: f64 = 3.0;
 const UNPLACED: f64 = 0.3;
 /// A line whose width is not known is a mode where the residues of its FRFs have a common phase (collinearity) …
 const IN_PHASE: f64 = 0.9;
+/// … which two of them have by chance.
+const IN_PHASE_FROM: usize = 3;
+/// A peak that the common fit lost is given where it is at least this share as high as the highest of an FRF.
+const CLEARLY_HIGH: f64 = 0.05;
 /// FRFs that scatter this many times as much as their noise makes them have more than noise.
 const BEYOND_NOISE: f64 = 1.5;
 /// Of what the mean over the FRFs and the common pole of a mode that moves are apart, this part is uncertainty.
@@ -247,6 +251,7 @@ pub(crate) fn collect(
             });
         }
     }
+    let (own_hz, missed_hz) = by_themselves(members, of_member, result);
     if !hardly_seen.is_empty() {
         result.warnings.push(format!(
             "hardly above the noise, in one FRF or none, and left out: {} Hz",
@@ -277,20 +282,7 @@ pub(crate) fn collect(
             complex.join(", ")
         ));
     }
-    let residues: Vec<Vec<Complex64>> = result
-        .modes
-        .iter()
-        .map(|m| {
-            m.constants
-                .iter()
-                .map(|c| c.map_or(Complex64::ZERO, |(value, std)| shape::as_known(value, std)))
-                .collect()
-        })
-        .collect();
-    result.mac = residues
-        .iter()
-        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
-        .collect();
+    result.mac = mac(&result.modes);
     let where_modes_are = around(&result.modes);
     let mut power = Power::default();
     for (m, d) in data.iter().enumerate() {
@@ -312,11 +304,78 @@ pub(crate) fn collect(
             moving: moving > 0 && 2 * moving >= scatters.len(),
             doubts,
             elsewhere_hz,
-            missed_hz: own_places::missed(members, &result.modes),
+            own_hz,
+            missed_hz,
             converged: groups.iter().all(|g| g.solution.converged),
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// MAC of every two modes, from their residues in all FRFs, each as far as it is known.
+pub(crate) fn mac(modes: &[GlobalMode]) -> Vec<Vec<f64>> {
+    let residues: Vec<Vec<Complex64>> = modes
+        .iter()
+        .map(|m| {
+            m.constants
+                .iter()
+                .map(|c| c.map_or(Complex64::ZERO, |(value, std)| shape::as_known(value, std)))
+                .collect()
+        })
+        .collect();
+    residues
+        .iter()
+        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
+        .collect()
+}
+
+/// Gives clear peaks of the FRFs that no common mode accounts for as modes where the FRFs move in one phase there; of those given, and of
+/// those that are not, the frequencies, Hz.
+pub(crate) fn by_themselves(
+    members: &[&SetMember],
+    of_member: &[usize],
+    result: &mut GlobalModes,
+) -> (Vec<f64>, Vec<f64>) {
+    let (mut given, mut not_given) = (Vec::new(), Vec::new());
+    for missed in own_places::missed(members, &result.modes) {
+        let Pole {
+            frequency_hz,
+            damping_ratio,
+        } = missed.own.pole;
+        if damping_ratio >= MAX_DAMPING {
+            continue;
+        }
+        let mut known = vec![None; members.len()];
+        let mut constants = vec![None; result.reconstructions.len()];
+        for &(m, value, std) in &missed.constants {
+            known[m] = Some(shape::as_known(value, std));
+            constants[of_member[m]] = Some((value, std));
+        }
+        let phases: Vec<Complex64> = known.iter().flatten().copied().collect();
+        let in_phase =
+            phases.len() < IN_PHASE_FROM || shape::complexity(&phases).is_some_and(|c| c.mpc > IN_PHASE);
+        if phases.is_empty() || !in_phase || missed.height < CLEARLY_HIGH {
+            not_given.push(frequency_hz);
+            continue;
+        }
+        given.push(frequency_hz);
+        let shape = shape_of(&known, members);
+        result.modes.push(GlobalMode {
+            frequency_hz,
+            damping_ratio,
+            frequency_std_hz: missed.own.std[0],
+            damping_std: missed.own.std[1],
+            found_in: missed.constants.len(),
+            lines_in_half_power_band: missed.lines_in_half_power_band,
+            complexity: shape::complexity(&shape.iter().map(|s| s.1).collect::<Vec<_>>()),
+            shape,
+            constants,
+        });
+    }
+    result
+        .modes
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    (given, not_given)
 }
 
 /// Why a pole cannot be a mode of these lines: it stands for what the model lacks.
@@ -356,9 +415,9 @@ fn scatter(solution: &ml_fit::Solution, j: usize, noise: [f64; 2]) -> [Otherwise
     })
 }
 
-/// How far the FRFs' own local fits are from a common pole (frequency, Hz; damping ratio), where that is more than the
-/// uncertainty of both; else zero. With a few FRFs both fits rest on the same lines: noise cannot part them, only what
-/// one of the two models does not know (leakage, modes drifting during the record).
+/// How far the FRFs' own local fits are from a common pole (frequency, Hz; damping ratio), where that is more than `std`, what the noise
+/// makes of the common pole; else zero. With a few FRFs both fits rest on the same lines: noise cannot part them, only what one of
+/// the two models does not know (neighbours that one of them has and the other has not, leakage, modes drifting during the record).
 fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
     let width_hz = pole.damping_ratio * pole.frequency_hz;
     let mut most = [0.0f64; 2];
@@ -369,15 +428,12 @@ fn disagreement(members: &[&SetMember], pole: Pole, std: [f64; 2]) -> [f64; 2] {
             (own.frequency_hz - pole.frequency_hz).abs(),
             (own.damping_ratio - pole.damping_ratio).abs(),
         ];
-        let (Some(frequency_std_hz), Some(damping_std)) = (own.frequency_std_hz, own.damping_std) else {
-            continue;
-        };
         // Another mode, or two that the local fit takes for one.
         if apart[0] > 0.5 * width_hz.max(line_hz) || apart[1] > 0.5 * pole.damping_ratio {
             continue;
         }
-        for (k, own_std) in [frequency_std_hz, damping_std].into_iter().enumerate() {
-            if apart[k] > APART * std[k].hypot(own_std) {
+        for k in 0..2 {
+            if apart[k] > APART * std[k] {
                 most[k] = most[k].max(apart[k]);
             }
         }
@@ -547,11 +603,15 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
         .iter()
         .filter(|m| m.lines_in_half_power_band < FINE_LINES && m.damping_std > UNCERTAIN * m.damping_ratio)
         .map(|m| {
+            let share = m.damping_std / m.damping_ratio;
+            let known = match share < 1.0 {
+                true => format!("is uncertain to {:.0} %", (100.0 * share).ceil()),
+                false => "is not known".into(),
+            };
             format!(
-                "at {} Hz lines the damping of the {:.1} Hz mode is uncertain to {:.0} %",
+                "at {} Hz lines the damping of the {} Hz mode {known}",
                 short(joint_fit::line_hz(data, m.frequency_hz)),
-                m.frequency_hz,
-                (100.0 * m.damping_std / m.damping_ratio).ceil()
+                crate::text::figures(m.frequency_hz, 4),
             )
         })
         .collect();

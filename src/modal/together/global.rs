@@ -90,9 +90,18 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
     let groups = solve::solve(&mut data, &start, &mut changes)
         .and_then(|groups| verify::verified(&data, groups, &mut rejected));
     let Some(groups) = groups else {
+        let (own_hz, _) = findings::by_themselves(&members, &of_member, &mut result);
+        let what = match own_hz.is_empty() {
+            true => "no global modes",
+            false => "the modes are those of the FRFs by themselves",
+        };
+        if !own_hz.is_empty() {
+            result.quality.reasons = vec![format!("no common fit, {what}")];
+        }
         result
             .warnings
-            .push("the FRFs together do not determine common poles: no global modes".into());
+            .push(format!("the FRFs together do not determine common poles: {what}"));
+        result.mac = findings::mac(&result.modes);
         findings::reject(rejected, &mut diagram, &mut result);
         result.stabilisation = diagram;
         return Ok(result);

@@ -1,6 +1,8 @@
 //! Where the FRFs by themselves put a mode. A common fit of a whole band describes hundreds of lines that are no mode's, and what
 //! it lacks far away can move a mode; the fit of each FRF around its own peak knows nothing of that.
 
+use num_complex::Complex64;
+
 use crate::modal::settings::SET;
 use crate::modal::single::curve::reach;
 use crate::modal::single::frf_modes::FrfMode;
@@ -94,17 +96,30 @@ fn width_or_line_hz(mode: &FrfMode, half_width_hz: f64) -> f64 {
     half_width_hz * (2.0 / mode.lines_in_half_power_band).max(1.0)
 }
 
+/// A mode that FRFs have by themselves and that no common mode accounts for.
+#[derive(Debug)]
+pub(super) struct MissedMode {
+    pub own: OwnPlace,
+    /// Of the FRF that resolves it least.
+    pub lines_in_half_power_band: f64,
+    /// By FRF that has it (its number, ascending): modal constant, 1/kg, and the standard deviation of its parts.
+    pub constants: Vec<(usize, Complex64, f64)>,
+    /// Its height over that of the highest mode of an FRF (as mobility), at most.
+    pub height: f64,
+}
+
 /// Peaks that most of the FRFs know well by themselves, that are among the highest of each (as mobility), and that no common mode
-/// accounts for, Hz.
-pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
-    struct Place {
+/// accounts for, ascending in frequency.
+pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<MissedMode> {
+    struct Place<'a> {
         frequency_hz: f64,
         /// Half-width, or a line where that is more, Hz.
         width_hz: f64,
-        frfs: usize,
+        own: Vec<(usize, &'a FrfMode)>,
+        height: f64,
     }
     let mut places: Vec<Place> = Vec::new();
-    for member in members {
+    for (m, member) in members.iter().enumerate() {
         let known = |mode: &&FrfMode| {
             let own = mode.best();
             let width_hz = own.damping_ratio * own.frequency_hz;
@@ -124,33 +139,79 @@ pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<f64> {
             let own = mode.best();
             let half_width_hz = own.damping_ratio * own.frequency_hz;
             let width_hz = width_or_line_hz(mode, half_width_hz);
+            let height = height(mode) / highest;
             let same = |p: &&mut Place| (p.frequency_hz - own.frequency_hz).abs() < p.width_hz + width_hz;
             match places.iter_mut().find(same) {
-                Some(place) => place.frfs += 1,
+                Some(place) => {
+                    place.own.push((m, mode));
+                    place.height = place.height.max(height);
+                }
                 None => places.push(Place {
                     frequency_hz: own.frequency_hz,
                     width_hz,
-                    frfs: 1,
+                    own: vec![(m, mode)],
+                    height,
                 }),
             }
         }
     }
-    let mut missed: Vec<f64> = places
+    places.retain(|place| {
+        let reaching = members
+            .iter()
+            .filter(|m| reach(m.frequency_hz, place.frequency_hz));
+        let accounts = |mode: &GlobalMode| {
+            let width_hz = mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
+            (mode.frequency_hz - place.frequency_hz).abs() < place.width_hz + width_hz
+        };
+        2 * place.own.len() > reaching.count() && !found.iter().any(accounts)
+    });
+    places.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    places
+        .iter_mut()
+        .for_each(|place| place.own.dedup_by_key(|(m, _)| *m));
+    places
         .iter()
-        .filter(|place| {
-            let reaching = members
-                .iter()
-                .filter(|m| reach(m.frequency_hz, place.frequency_hz));
-            let accounts = |mode: &GlobalMode| {
-                let width_hz = mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
-                (mode.frequency_hz - place.frequency_hz).abs() < place.width_hz + width_hz
+        .map(|place| {
+            let own: Vec<(Pole, [f64; 2])> =
+                place.own.iter().filter_map(|(_, mode)| with_std(mode)).collect();
+            let (pole, std) = match own.as_slice() {
+                [one] => *one,
+                several => mean_pole(several),
             };
-            2 * place.frfs > reaching.count() && !found.iter().any(accounts)
+            MissedMode {
+                own: OwnPlace { pole, std },
+                lines_in_half_power_band: place
+                    .own
+                    .iter()
+                    .map(|(_, mode)| mode.lines_in_half_power_band)
+                    .fold(f64::INFINITY, f64::min),
+                constants: place
+                    .own
+                    .iter()
+                    .filter_map(|(m, mode)| {
+                        let best = mode.best();
+                        let constant = best.modal_constant?;
+                        Some((
+                            *m,
+                            constant,
+                            constant.norm() * best.damping_std? / best.damping_ratio,
+                        ))
+                    })
+                    .collect(),
+                height: place.height,
+            }
         })
-        .map(|place| place.frequency_hz)
-        .collect();
-    missed.sort_by(f64::total_cmp);
-    missed
+        .collect()
+}
+
+/// The pole of a mode with the standard deviations of its frequency (Hz) and damping ratio.
+fn with_std(mode: &FrfMode) -> Option<(Pole, [f64; 2])> {
+    let best = mode.best();
+    let pole = Pole {
+        frequency_hz: best.frequency_hz,
+        damping_ratio: best.damping_ratio,
+    };
+    Some((pole, [best.frequency_std_hz?, best.damping_std?]))
 }
 
 #[cfg(test)]
@@ -238,9 +299,10 @@ mod tests {
         // Not among the common modes: missed, unless one of these is at the place.
         let missing = missed(&members, &[]);
         assert!(
-            missing.len() == 1 && (missing[0] - 100.0).abs() < 0.05,
+            missing.len() == 1 && (missing[0].own.pole.frequency_hz - 100.0).abs() < 0.05,
             "{missing:?}"
         );
+        assert_eq!(missing[0].constants.len(), members.len());
         let found = |frequency_hz| GlobalMode {
             frequency_hz,
             damping_ratio: 0.006,

@@ -63,6 +63,10 @@ const IN_PHASE: f64 = 0.7;
 const CLEARLY: f64 = 20.0;
 /// … as long as they are nearer than this share of the sum of their half-widths, or than a line: what a moving pole may look like.
 const HARD_TO_TELL: f64 = 0.5;
+/// A pole so many times as wide as its neighbour is the ground on which that stands …
+const GROUND: f64 = 5.0;
+/// … where it is more than so many of the neighbour's half-widths away.
+const FAR_WIDTHS: f64 = 3.0;
 /// Shapes that repeat …
 const SAME_SHAPE: f64 = 0.9;
 /// … and that do where two poles are at the same place.
@@ -437,7 +441,14 @@ fn close_pair(
     // Leakage and what else one pole lacks gives two poles an edge that more FRFs would see through.
     let hard_to_tell = !enough && apart_hz < (HARD_TO_TELL * width).max(line_hz);
     let most = if hard_to_tell { CLEARLY } else { 1.0 };
-    let moving = moving(data, solution, strong, weak);
+    // A narrow mode does not move as far as a broad one beside it reaches.
+    let halves = [a, b].map(|p| p.damping_ratio * p.frequency_hz);
+    let (narrow_hz, broad_hz) = (halves[0].min(halves[1]), halves[0].max(halves[1]));
+    let is_ground = broad_hz > GROUND * narrow_hz && apart_hz > FAR_WIDTHS * narrow_hz.max(0.5 * line_hz);
+    let moving = match is_ground {
+        true => None,
+        false => moving(data, solution, strong, weak),
+    };
     if let Some(moving) = moving.as_ref().filter(|m| m.leaves <= most) {
         return Some(ClosePair {
             strong,

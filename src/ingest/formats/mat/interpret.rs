@@ -1,6 +1,7 @@
 //! What the arrays of a MAT-file are, by name, shape and kind of number. A MAT-file has no standard for measurements:
 //! whatever is decided here is said in the notes.
 
+mod parts;
 #[cfg(test)]
 mod tests;
 
@@ -34,9 +35,10 @@ pub(crate) fn contents(
                 .remedy("save the frequency axis f (Hz) or the times t (s) and the data as plain arrays"),
         );
     }
-    let mut used = vec![false; variables.len()];
     let mut contents = Contents::default();
     join_parts(&mut variables, notes);
+    parts::join_pairs(&mut variables, notes);
+    let mut used = vec![false; variables.len()];
     let mut damaged = None;
     testlab::functions(&variables, labels, &mut used, &mut contents, budget, notes)?;
     tables(
@@ -173,11 +175,22 @@ fn tables(
                 }
             }
             _ if is_real && columns == 3 && variable.is_called_frf() => {
-                let both = column(1)
-                    .iter()
-                    .zip(column(2))
-                    .map(|(re, im)| Complex64::new(*re, *im))
-                    .collect();
+                let both = match parts::in_degrees(column(1), column(2)) {
+                    Some(degrees) => {
+                        notes.about(
+                            &variable.name,
+                            format!(
+                                "columns of frequency, magnitude and phase in {}",
+                                parts::unit(degrees)
+                            ),
+                        );
+                        parts::polar(column(1), column(2), degrees)
+                    }
+                    None => {
+                        let both = column(1).iter().zip(column(2));
+                        both.map(|(re, im)| Complex64::new(*re, *im)).collect()
+                    }
+                };
                 frf(variable.name.clone(), both, notes)?;
             }
             Kind::Other(kind) => contents.others.extend((1..columns).map(|c| OtherRecord {
@@ -206,7 +219,9 @@ fn tables(
             _ => continue,
         }
         used[k] = true;
-        let what = if matches!(kind(variable), Kind::Unknown) {
+        let what = if matches!(kind(variable), Kind::Unknown)
+            && !(is_real && columns == 3 && variable.is_called_frf())
+        {
             "time"
         } else {
             "frequency"
@@ -508,9 +523,9 @@ fn kind(variable: &Variable) -> Kind {
 fn quantity(variable: &Variable) -> Option<Quantity> {
     if variable.mentions(&["recept", "complian"]) {
         Some(Quantity::Receptance)
-    } else if variable.mentions(&["mobil"]) {
+    } else if variable.mentions(&["mobil", "veloc", "vibrom"]) {
         Some(Quantity::Mobility)
-    } else if variable.mentions(&["accel", "inert"]) {
+    } else if variable.mentions(&["accel", "acel", "inert"]) {
         Some(Quantity::Accelerance)
     } else {
         None

@@ -248,6 +248,14 @@ fn frf_quantity(
             notes.about(name, format!("unit {:?} not understood, SI assumed", axis.unit));
         }
     }
+    let is_whole = units::is_blank(&denominator.unit) || numerator.unit.contains('/');
+    let ratio = match is_whole {
+        true => numerator.unit.clone(),
+        false => format!("{}/{}", numerator.unit, denominator.unit),
+    };
+    if let Some(remark) = units::no_motion_per_force(&ratio) {
+        notes.about(name, remark);
+    }
     let per_force = match denominator.kind {
         EXCITATION_FORCE | REACTION_FORCE | 0 | 1 => true,
         _ => {

@@ -94,6 +94,13 @@ fn quantity_and_factor_by_type_and_label() {
             "",
         ),
         (
+            (12, "NONE", "V"),
+            NEWTON,
+            Some(Quantity::Accelerance),
+            1.0,
+            "counts in volts",
+        ),
+        (
             (12, "NONE", "NONE"),
             (13, "NONE", "NONE"),
             Some(Quantity::Accelerance),

@@ -266,7 +266,22 @@ fn hammer<'a>(record: &'a TimeRecord, path: &Path, said: Option<&str>) -> Result
 
 fn said_hammer<'a>(record: &'a TimeRecord, path: &Path, said: &str) -> Result<&'a Channel> {
     let channels = &record.channels;
-    let by_name = channels.iter().find(|c| c.name.eq_ignore_ascii_case(said));
+    // `force [N]` is the force.
+    let without_unit = |name: &str| {
+        name.split(['[', '('])
+            .next()
+            .unwrap_or(name)
+            .trim()
+            .to_lowercase()
+    };
+    let by_name = channels
+        .iter()
+        .find(|c| c.name.eq_ignore_ascii_case(said))
+        .or_else(|| {
+            channels
+                .iter()
+                .find(|c| without_unit(&c.name) == said.to_lowercase())
+        });
     let number = || channels.get(said.parse::<usize>().ok()?.checked_sub(1)?);
     by_name.or_else(number).ok_or_else(|| {
         InputError::new(format!("no channel is called {said} ({})", named(record)))
@@ -583,10 +598,13 @@ mod tests {
             read(file.path(), &reading, &mut Told::default())
         };
         for said in ["out", "1"] {
-            assert_eq!(of(said).unwrap()[0].name, "in/out");
+            assert_eq!(of(said).unwrap()[0].name, "in [V]/out [V]");
         }
         let error = of("force").unwrap_err().to_string();
-        assert!(error.contains("no channel is called force (out, in)"), "{error}");
+        assert!(
+            error.contains("no channel is called force (out [V], in [V])"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -22,6 +22,9 @@ const PHASE_UNITS: [&str; 6] = ["", "_deg", "deg", "_rad", "rad", "le"];
 /// A phase beyond this is in degrees: 2π and a bit.
 const MOST_RADIANS: f64 = 7.0;
 
+/// A phase that changes by less, in whatever unit, is none.
+const LEAST_TURN: f64 = 1.0;
+
 /// Two real arrays of one size whose names differ by such a word only become one complex array.
 pub(super) fn join_pairs(variables: &mut Vec<Variable>, notes: &mut Notes) {
     let words = CARTESIAN
@@ -89,7 +92,8 @@ fn pair(variables: &[Variable], first: &str, second: &str, is_polar: bool) -> Op
 
 /// Are two columns magnitude and phase (the real part of an FRF has both signs), and the phase in degrees?
 pub(super) fn in_degrees(magnitude: &[f64], phase: &[f64]) -> Option<bool> {
-    let is_polar = magnitude.iter().all(|m| *m >= 0.0) && phase.iter().any(|p| *p < 0.0);
+    let (least, greatest) = crate::signal::least_and_greatest(phase);
+    let is_polar = magnitude.iter().all(|m| *m >= 0.0) && least < 0.0 && greatest - least > LEAST_TURN;
     is_polar.then(|| phase.iter().any(|p| p.abs() > MOST_RADIANS))
 }
 

@@ -38,6 +38,23 @@ impl<D: Modelled> Diagnosis<D> {
         self.effect.map(|w| &self.candidates[w])
     }
 
+    /// `thermal-drift explains more by itself, less beside such errors`: effects that come before the named one as long as no small errors
+    /// of the setup are fitted beside them. `None` where there are none.
+    pub fn passed_over_in_words(&self) -> Option<String> {
+        let before = &self.candidates[..self.effect?];
+        let tried = |c: &&EffectCandidate<D>| c.rest.as_ref().is_some_and(|r| r.beyond_slips.is_some());
+        let labels: Vec<String> = before.iter().filter(tried).map(EffectCandidate::label).collect();
+        let verb = match labels.len() {
+            0 => return None,
+            1 => "explains more by itself",
+            _ => "explain more by themselves",
+        };
+        Some(format!(
+            "{} {verb}, less beside such errors",
+            crate::text::listed(&labels)
+        ))
+    }
+
     /// `A second effect is likely besides: payload`; `None` where one effect explains all.
     pub fn besides_in_words(&self) -> Option<String> {
         match self.companions.as_slice() {

@@ -108,7 +108,7 @@ impl Rest {
         let share = self.share_of_slips().filter(|share| *share > NEARLY)?;
         Some(format!(
             "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it (angles of joints, sensors and hits, gain \
-             of the hammer, stiffness from posture to posture)",
+             of the hammer, stiffness from posture to posture, warming up)",
             100.0 * self.share_of_signal(largest.excess),
             100.0 * share,
         ))

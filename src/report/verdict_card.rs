@@ -97,6 +97,9 @@ fn answer<D: Modelled>(
                 card.explanation += &format!(
                     " It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
                 );
+                if let Some(others) = d.passed_over_in_words() {
+                    card.explanation += &format!(" {others}.");
+                }
             }
         }
         (DiagnosisVerdict::None, _) => {

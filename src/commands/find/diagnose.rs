@@ -398,9 +398,10 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
             let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
             let left = excuse.map_or(String::new(), |left| {
                 let share = 100.0 * winner.share_above_noise(&d.baseline);
+                let others = d.passed_over_in_words().map_or(String::new(), |o| format!(" {o}."));
                 wrapped(
                     &format!(
-                        "It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
+                        "It explains {share:.0} % of what stands above the noise; what it leaves is {left}.{others}"
                     ),
                     "  ",
                 )

@@ -435,7 +435,8 @@ impl<'a, S: Study> Engine<'a, S> {
             }
         }
         baseline.rest.beyond_slips = self.beyond_slips(&baseline.rest, self.model, &baseline.theta)?;
-        let Some(w) = winner.filter(|w| verdict::mostly_slips(&candidates[*w])) else {
+        let mostly_slips = |w: &usize| candidates[*w].rest.as_ref().is_some_and(Rest::is_mostly_slips);
+        let Some(w) = winner.filter(mostly_slips) else {
             return Ok(winner);
         };
         let rivals: Vec<&mut CandidateOf<S>> = candidates[w + 1..]

@@ -38,19 +38,24 @@ impl<D: Modelled> Diagnosis<D> {
         self.effect.map(|w| &self.candidates[w])
     }
 
-    /// `thermal-drift explains more by itself, less beside such errors`: effects that come before the named one as long as no small errors
-    /// of the setup are fitted beside them. `None` where there are none.
-    pub fn passed_over_in_words(&self) -> Option<String> {
+    /// `It explains 93 % of what stands above the noise; what it leaves is …`, where small errors of the setup explain nearly all of that;
+    /// and which effects would come before the named one, were such errors not fitted beside them.
+    pub fn excuse_in_words(&self) -> Option<String> {
+        let winner = self.winner()?;
+        let left = winner.rest.as_ref()?.excuse_in_words()?;
+        let share = 100.0 * winner.share_above_noise(&self.baseline);
+        let excuse =
+            format!("It explains {share:.0} % of what stands above the noise; what it leaves is {left}.");
         let before = &self.candidates[..self.effect?];
         let tried = |c: &&EffectCandidate<D>| c.rest.as_ref().is_some_and(|r| r.beyond_slips.is_some());
         let labels: Vec<String> = before.iter().filter(tried).map(EffectCandidate::label).collect();
-        let verb = match labels.len() {
-            0 => return None,
+        let explain = match labels.len() {
+            0 => return Some(excuse),
             1 => "explains more by itself",
             _ => "explain more by themselves",
         };
         Some(format!(
-            "{} {verb}, less beside such errors",
+            "{excuse} {} {explain}, less beside such errors.",
             crate::text::listed(&labels)
         ))
     }

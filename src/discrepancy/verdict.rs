@@ -269,19 +269,6 @@ fn odds_against<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) -> 
     }
 }
 
-/// Share of a rest up to which small errors of the setup leave next to nothing of it.
-const NEXT_TO_NOTHING: f64 = 0.1;
-
-/// Whether what a candidate leaves is, nearly all of it, what small errors of the setup do.
-pub fn mostly_slips<D: Modelled>(c: &EffectCandidate<D>) -> bool {
-    let share_left = || {
-        let rest = c.rest.as_ref()?;
-        let largest = rest.largest()?;
-        Some(rest.beyond_slips.as_ref()?.same(largest)?.excess / largest.excess)
-    };
-    share_left().is_some_and(|share| share < NEXT_TO_NOTHING)
-}
-
 /// χ² that a candidate and the small errors of the setup beside it take away, less the price of both, and the multiple of white noise
 /// that neighbouring lines have in common. `None` where such errors were sought at none of its rests, or not at this one.
 pub fn gain_with_slips<D: Modelled>(c: &EffectCandidate<D>) -> Option<(f64, f64)> {

@@ -103,15 +103,20 @@ impl Rest {
 
     /// What is left in words, where the small errors of a setup explain nearly all of it.
     pub fn excuse_in_words(&self) -> Option<String> {
-        const NEARLY: f64 = 0.9;
         let largest = self.largest()?;
-        let share = self.share_of_slips().filter(|share| *share > NEARLY)?;
+        let share = self.share_of_slips().filter(|_| self.is_mostly_slips())?;
         Some(format!(
             "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it (angles of joints, sensors and hits, gain \
              of the hammer, stiffness from posture to posture, warming up)",
             100.0 * self.share_of_signal(largest.excess),
             100.0 * share,
         ))
+    }
+
+    /// Whether small errors of the setup explain nearly all of what tests of structure find.
+    pub fn is_mostly_slips(&self) -> bool {
+        const NEARLY: f64 = 0.9;
+        self.share_of_slips().is_some_and(|share| share > NEARLY)
     }
 
     /// Share of what tests of structure find that small errors of the setup explain; `None` where that was not tried.

@@ -151,8 +151,12 @@ impl QualityCheck {
             return Vec::new();
         };
         let mut warnings = Vec::new();
-        let samples: Vec<&[f64]> = record.channels.iter().map(|c| c.samples.as_slice()).collect();
-        let hammer = signal::pulsed_channel(&samples);
+        // Few records have spikes, and only those need the hammer.
+        let hammer = self.channels.iter().any(|c| c.spikes.first.is_some()).then(|| {
+            let samples: Vec<&[f64]> = record.channels.iter().map(|c| c.samples.as_slice()).collect();
+            signal::pulsed_channel(&samples)
+        });
+        let hammer = hammer.flatten();
         for (k, (channel, found)) in record.channels.iter().zip(&self.channels).enumerate() {
             warnings.extend(found.warnings(channel, &record.channels, hammer == Some(k)));
         }

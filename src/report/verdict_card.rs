@@ -92,14 +92,8 @@ fn answer<D: Modelled>(
             card.explanation = of.explanation.into();
             card.facts.push(("How big", sizes(&winner.parameters)));
             card.check = Some(of.lab_check.into());
-            if let Some(left) = winner.rest.as_ref().and_then(|r| r.excuse_in_words()) {
-                let share = 100.0 * winner.share_above_noise(&d.baseline);
-                card.explanation += &format!(
-                    " It explains {share:.0} % of what stands above the noise; what it leaves is {left}."
-                );
-                if let Some(others) = d.passed_over_in_words() {
-                    card.explanation += &format!(" {others}.");
-                }
+            if let Some(excuse) = d.excuse_in_words() {
+                card.explanation += &format!(" {excuse}");
             }
         }
         (DiagnosisVerdict::None, _) => {

@@ -14,9 +14,12 @@ const AROUND: f64 = 0.02;
 /// The only channel of short pulses that set another in motion; an electrical spike does not.
 pub fn pulsed_channel(channels: &[&[f64]]) -> Option<usize> {
     let length = channels.iter().map(|c| c.len()).min()?;
+    let channels: Vec<&[f64]> = channels.iter().map(|c| &c[..length]).collect();
+    let levels: Vec<f64> = channels.iter().map(|c| median(c)).collect();
     let lasting: Vec<Option<f64>> = channels
         .iter()
-        .map(|c| samples_that_count(&c[..length]))
+        .zip(&levels)
+        .map(|(c, level)| samples_that_count(c, *level))
         .collect();
     let known = || lasting.iter().enumerate().filter_map(|(k, n)| Some((k, (*n)?)));
     let (pulsed, shortest) = known().min_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -24,29 +27,27 @@ pub fn pulsed_channel(channels: &[&[f64]]) -> Option<usize> {
     if shortest > SHORT * length as f64 || others.any(|(_, n)| n < SHORTER * shortest) {
         return None;
     }
-    let level = median(&channels[pulsed][..length]);
-    let height = |k: &usize| (channels[pulsed][*k] - level).abs();
+    let height = |k: &usize| (channels[pulsed][*k] - levels[pulsed]).abs();
     let highest = (0..length).max_by(|a, b| height(a).total_cmp(&height(b)))?;
     let reach = ((AROUND * length as f64) as usize).max(4 * shortest.ceil() as usize);
     let gap = shortest.ceil() as usize;
     let before = highest.saturating_sub(reach + gap)..highest.saturating_sub(gap);
     let behind = highest..(highest + reach).min(length);
-    let moves = |channel: &[f64]| {
-        let level = median(&channel[..length]);
+    let moves = |k: usize| {
         let power = |range: std::ops::Range<usize>| {
             let count = range.len().max(1) as f64;
-            channel[range].iter().map(|x| (x - level).powi(2)).sum::<f64>() / count
+            let squares = channels[k][range].iter().map(|x| (x - levels[k]).powi(2));
+            squares.sum::<f64>() / count
         };
         power(behind.clone()) > SET_IN_MOTION * power(before.clone())
     };
     // A record that begins with the pulse has nothing before it to compare with.
     let begins_with_it = before.len() < reach / 4;
-    (begins_with_it || known().any(|(k, _)| k != pulsed && moves(channels[k]))).then_some(pulsed)
+    (begins_with_it || known().any(|(k, _)| k != pulsed && moves(k))).then_some(pulsed)
 }
 
-/// How many samples share a channel's power among them; `None` where it is flat.
-fn samples_that_count(samples: &[f64]) -> Option<f64> {
-    let level = median(samples);
+/// How many samples share a channel's power about its level among them; `None` where it is flat.
+fn samples_that_count(samples: &[f64], level: f64) -> Option<f64> {
     let (squares, fourths) = samples.iter().fold((0.0, 0.0), |(s, f), x| {
         let square = (x - level).powi(2);
         (s + square, f + square * square)

@@ -15,7 +15,6 @@ use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandida
 use crate::identify::Modelled;
 use crate::identify::Options;
 use crate::identify::frfs::structure_study::residual_peaks;
-use crate::identify::rest::Rest;
 use crate::report::verdict_card::departure;
 use crate::report::words;
 use crate::text::chance;
@@ -395,17 +394,9 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
     match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
             let effect = winner.instance.effect;
-            let excuse = winner.rest.as_ref().and_then(Rest::excuse_in_words);
-            let left = excuse.map_or(String::new(), |left| {
-                let share = 100.0 * winner.share_above_noise(&d.baseline);
-                let others = d.passed_over_in_words().map_or(String::new(), |o| format!(" {o}."));
-                wrapped(
-                    &format!(
-                        "It explains {share:.0} % of what stands above the noise; what it leaves is {left}.{others}"
-                    ),
-                    "  ",
-                )
-            });
+            let left = d
+                .excuse_in_words()
+                .map_or(String::new(), |excuse| wrapped(&excuse, "  "));
             format!(
                 "{} ({sure})\n{}{}{left}",
                 Emphasis::Strong.on(format!("MISSING: {}", winner.label())),

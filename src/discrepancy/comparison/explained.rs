@@ -196,7 +196,9 @@ impl Explained {
     /// In a plain sentence or two; `effect` is its name.
     pub fn sentence(&self, effect: &str) -> String {
         let Some(share) = self.total.share else {
-            return format!("{effect} has nothing to take away: no more than noise is left without it.");
+            return format!(
+                "{effect} takes away nothing that stands above the noise line by line: only all lines together can speak for it."
+            );
         };
         let mut text = format!(
             "{effect} takes away {} % of what stood above the noise: mostly {}.",

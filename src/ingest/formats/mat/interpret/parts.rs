@@ -21,7 +21,6 @@ const POLAR: [[&str; 2]; 8] = [
 const PHASE_UNITS: [&str; 6] = ["", "_deg", "deg", "_rad", "rad", "le"];
 /// A phase beyond this is in degrees: 2π and a bit.
 const MOST_RADIANS: f64 = 7.0;
-
 /// A phase that changes by less, in whatever unit, is none.
 const LEAST_TURN: f64 = 1.0;
 
@@ -33,14 +32,14 @@ pub(super) fn join_pairs(variables: &mut Vec<Variable>, notes: &mut Notes) {
         .chain(POLAR.iter().map(|w| (w, true)));
     for ([first, second], is_polar) in words {
         while let Some((a, b)) = pair(variables, first, second, is_polar) {
-            let other = variables[b].clone();
-            let one = &mut variables[a];
+            let other = variables.remove(b);
+            let one = &mut variables[if b < a { a - 1 } else { a }];
             let told = if is_polar {
                 let named = other.own_name().to_lowercase();
                 let degrees = match (named.contains("deg"), named.contains("rad")) {
                     (true, _) => true,
                     (_, true) => false,
-                    _ => other.re.iter().any(|p| p.abs() > MOST_RADIANS),
+                    _ => beyond_radians(&other.re),
                 };
                 let joined = polar(&one.re, &other.re, degrees);
                 one.re = joined.iter().map(|z| z.re).collect();
@@ -51,7 +50,6 @@ pub(super) fn join_pairs(variables: &mut Vec<Variable>, notes: &mut Notes) {
                 format!("the real part, with the imaginary part {}", other.name)
             };
             notes.about(&one.name, told);
-            variables.remove(b);
         }
     }
 }
@@ -94,7 +92,11 @@ fn pair(variables: &[Variable], first: &str, second: &str, is_polar: bool) -> Op
 pub(super) fn in_degrees(magnitude: &[f64], phase: &[f64]) -> Option<bool> {
     let (least, greatest) = crate::signal::least_and_greatest(phase);
     let is_polar = magnitude.iter().all(|m| *m >= 0.0) && least < 0.0 && greatest - least > LEAST_TURN;
-    is_polar.then(|| phase.iter().any(|p| p.abs() > MOST_RADIANS))
+    is_polar.then(|| beyond_radians(phase))
+}
+
+fn beyond_radians(phase: &[f64]) -> bool {
+    phase.iter().any(|p| p.abs() > MOST_RADIANS)
 }
 
 pub(super) fn polar(magnitude: &[f64], phase: &[f64], degrees: bool) -> Vec<Complex64> {

@@ -39,9 +39,9 @@ pub enum Gain {
     None,
     /// N (N·m) for one of the unit that the values are in.
     PerUnit(f64),
-    /// N (N·m) for one volt or coulomb (both count as volts), and the unit of the values where nobody says it, in volts or
-    /// coulombs: that of the gain.
-    PerVolt(f64, f64),
+    /// N (N·m) for one volt, coulomb (counts as a volt) or ampere, and the gain's electrical unit: that of the values where nobody
+    /// says it.
+    PerElectric(f64, Unit),
 }
 
 /// One channel.
@@ -81,7 +81,7 @@ pub fn unit_of_charge_or_other(label: &str) -> Option<Unit> {
 }
 
 impl Gain {
-    /// `500 N/V`, `2 kN/V`, `-3.85 pC/N`, `10 mV/N`; a moment likewise.
+    /// `500 N/V`, `2 kN/V`, `-3.85 pC/N`, `10 mV/N`, `350 N/A`; a moment likewise.
     ///
     /// # Errors
     /// What is wrong with it.
@@ -96,24 +96,20 @@ impl Gain {
         let (Some(value), Some(unit)) = (value, unit_of_charge_or_other(label)) else {
             return Err(format!("{text:?} is no gain"));
         };
-        let per = |force: Dimension| {
-            let volts = Dimension::VOLTAGE;
-            [(force.over(volts), false), (volts.over(force), true)]
-        };
-        for (dimension, is_sensitivity) in per(Dimension::FORCE).into_iter().chain(per(Dimension::MOMENT)) {
-            if unit.dimension == dimension {
-                let si = value * unit.factor;
-                let (above, below) = label.split_once('/').unwrap_or((label, ""));
-                let electric = unit_of_charge_or_other(if is_sensitivity { above } else { below });
-                let electric = electric.map_or(1.0, |u| u.factor);
-                return Ok(Gain::PerVolt(
-                    if is_sensitivity { si.recip() } else { si },
-                    electric,
-                ));
+        let si = value * unit.factor;
+        let (above, below) = label.split_once('/').unwrap_or((label, ""));
+        let is_load = |u: Unit| [Dimension::FORCE, Dimension::MOMENT].contains(&u.dimension);
+        let is_electric = |u: Unit| [Dimension::VOLTAGE, Dimension::CURRENT].contains(&u.dimension);
+        if let (Some(above), Some(below)) = (unit_of_charge_or_other(above), unit_of_charge_or_other(below)) {
+            if is_load(above) && is_electric(below) {
+                return Ok(Gain::PerElectric(si, below));
+            }
+            if is_electric(above) && is_load(below) {
+                return Ok(Gain::PerElectric(si.recip(), above));
             }
         }
         Err(format!(
-            "{label:?} is no force per volt or charge, nor the other way round"
+            "{label:?} is no force per volt, charge or ampere, nor the other way round"
         ))
     }
 }
@@ -290,10 +286,7 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
         // Readers turn what they understand into SI already.
         let said = units::parse(&channel.file_unit);
         let of_gain = match rule.gain {
-            Gain::PerVolt(_, factor) => Some(Unit {
-                factor,
-                dimension: Dimension::VOLTAGE,
-            }),
+            Gain::PerElectric(_, unit) => Some(unit),
             _ => None,
         };
         let unit = rule.unit.or(said).or(of_gain);
@@ -335,13 +328,13 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
                 }
             }
             Gain::PerUnit(gain) => gain / factor,
-            Gain::PerVolt(gain, _) => match unit {
-                Some(unit) if unit.dimension == Dimension::VOLTAGE => gain,
+            Gain::PerElectric(gain, electric) => match unit {
+                Some(unit) if unit.dimension == electric.dimension => gain,
                 _ => {
                     let remedy =
                         "give a gain for the unit the values are in, or leave it out where they are forces";
                     return Err(refuse(
-                        "its gain is for volts or charge, its values are not".into(),
+                        "its gain is for another unit than that of its values".into(),
                         remedy,
                     ));
                 }
@@ -585,7 +578,7 @@ mod tests {
     #[test]
     fn gains_are_forces_per_volt_or_sensitivities() {
         let value = |text: &str| match Gain::parse(text).unwrap() {
-            Gain::PerVolt(value, _) => value,
+            Gain::PerElectric(value, _) => value,
             other => panic!("{other:?}"),
         };
         assert!((value("500 N/V") - 500.0).abs() < 1e-9);
@@ -593,7 +586,10 @@ mod tests {
         assert!((value("10 mV/N") - 100.0).abs() < 1e-9);
         assert!((value("-3.85 pC/N") / (-1.0 / 3.85e-12) - 1.0).abs() < 1e-12);
         assert!((value("2 N·m/V") - 2.0).abs() < 1e-9);
-        for text in ["N/V", "500", "500 N", "0 N/V", "5 m/V"] {
+        assert!((value("350 N/A") - 350.0).abs() < 1e-9);
+        assert!((value("0.4 Nm/A") - 0.4).abs() < 1e-9);
+        assert!((value("20 mA/kN") - 50e3).abs() < 1e-6);
+        for text in ["N/V", "500", "500 N", "0 N/V", "5 m/V", "3 V/A"] {
             assert!(Gain::parse(text).is_err(), "{text}");
         }
     }

@@ -56,6 +56,29 @@ fn time(bytes: impl AsRef<[u8]>) -> (TimeRecord, Vec<String>) {
     (contents.times.remove(0), warnings)
 }
 
+/// Sections of settings, each a table with its values below the names, then what was recorded: no forces, the motors' currents.
+#[test]
+fn the_last_of_titled_sections_is_the_record() {
+    let mut text = String::from(
+        "*** General Infos ***\t\t\t\nVersion\tDate\tSample Rate (Hz)\tDecimal Separator\n9\t2024-05-30:14:06:14\t100\tComma\n\
+         \t\t\t\n*** Program ***\t\t\t\nStep Nb\tStroke (mm)\tRPM\tFeed (mm/s)\n0,000\t0,000\t0,000\t0,000\n\
+         1,000\t50,000\t1500,000\t1,000\n2,000\t50,000\t320,000\t0,160\n3,000\t50,000\t1500,000\t1,000\n\t\t\t\n\
+         *** Datas ***\t\t\t\nPosition (mm)\tI Torque (A)\tI Thrust (A)\tStep (nb)\n",
+    );
+    for i in 0..50 {
+        text += &format!("-0,{i:03}\t4,5{:02}\t0,1{:02}\t1,000\n", i * 7 % 100, i * 3 % 100);
+    }
+    let (record, _) = time(&text);
+    assert_eq!((record.sample_rate_hz, record.len()), (100.0, 50));
+    let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(
+        names,
+        ["Position (mm)", "I Torque (A)", "I Thrust (A)", "Step (nb)"]
+    );
+    assert!(record.channels.iter().all(|c| c.role == ChannelRole::Other));
+    assert!((record.channels[1].samples[1] - 4.507).abs() < 1e-12);
+}
+
 /// The twenty header lines of DynoWare 2.5, names and units, with one separator.
 fn dynoware(separator: char, rows: &str) -> String {
     let text = "DynoWare,Version 2.5.1.2\nPath:,C:\\Messung\nFilename:,cut7.dwd\nConfig ID:,a.cfg\nSetup ID:,0\n\

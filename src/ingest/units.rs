@@ -42,6 +42,8 @@ impl Dimension {
     pub const PRESSURE: Dimension = Dimension([-1, -2, 1, 0]);
     /// Volt; charges of piezoelectric sensors count as voltages.
     pub const VOLTAGE: Dimension = Dimension([0, 0, 0, 1]);
+    /// Ampere: watt per volt.
+    pub const CURRENT: Dimension = Dimension([2, -3, 1, -1]);
 
     /// Of this for one of `other`.
     pub fn over(self, other: Dimension) -> Dimension {
@@ -83,6 +85,7 @@ impl Dimension {
             Dimension::MOMENT => ("moment", "N·m"),
             Dimension::PRESSURE => ("pressure", "Pa"),
             Dimension::VOLTAGE => ("voltage", "V"),
+            Dimension::CURRENT => ("current", "A"),
             _ => return None,
         })
     }
@@ -286,6 +289,8 @@ fn named(name: &str) -> Option<(f64, Dimension)> {
         "us" | "µs" | "μs" => (1e-6, D::TIME),
         "kg" => (1.0, Dimension([0, 0, 1, 0])),
         "g" | "gn" | "G" => (STANDARD_GRAVITY, D::ACCELERATION),
+        "A" => (1.0, D::CURRENT),
+        "mA" => (1e-3, D::CURRENT),
         "N" => (1.0, D::FORCE),
         "mN" => (1e-3, D::FORCE),
         "MN" => (1e6, D::FORCE),

@@ -435,9 +435,7 @@ fn teeth_notice(
     record: &TimeRecord,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(milling) =
-        MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.teeth > 1 && m.places.is_empty())
-    else {
+    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.places.is_empty()) else {
         return;
     };
     let rate = record.sample_rate_hz;
@@ -486,17 +484,21 @@ fn teeth_notice(
         return;
     }
     let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
-    if let Some(slow) = tooth_passing_too_weak(&milling, [&orders[0], &orders[1]], [&std[0], &std[1]]) {
+    let known_mean = zero_is_known.then_some(mean);
+    let slow = tooth_passing_too_weak(&milling, [&orders[0], &orders[1]], [&std[0], &std[1]], known_mean);
+    if let Some(slow) = slow {
         notices.push(Notice {
             kind: OTHER_MULTIPLE,
             detail: format!(
                 "the line at twice the tooth-passing frequency of {} rpm × {} teeth is {} times as strong as that at the frequency \
-                 itself, and a cut of this immersion makes it {} times at most: as if the spindle ran at {} rpm",
+                 itself, and a cut of this immersion makes it {} times at most: as if the spindle ran at {} rpm, or the tool had {} \
+                 teeth",
                 cut.spindle_rpm,
                 milling.teeth,
                 figures(slow.measured, 2),
                 figures(slow.at_most, 2),
-                2.0 * cut.spindle_rpm
+                2.0 * cut.spindle_rpm,
+                2 * milling.teeth
             ),
         });
         return;

@@ -33,12 +33,7 @@ pub(crate) fn idle_tooth(
         return None;
     }
     let n = teeth as f64;
-    let single = MillingCut {
-        teeth: 1,
-        places: Vec::new(),
-        ..cut.clone()
-    };
-    let unit = single.closed_form(teeth);
+    let unit = single_tooth(cut).closed_form(teeth);
     // The edge is left out: its waveform differs little, and the scale comes from the mean.
     let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
     let of_tooth = |k: usize| -> f64 {
@@ -95,16 +90,21 @@ const FAR_ABOVE: f64 = 3.0;
 const RADIAL: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 const EDGE_MM: [f64; 4] = [0.0, 0.02, 0.1, 1.0];
 
+/// Part of the amplitude that the mean forces promise at the tooth passing, below which it is not there.
+const LACKING: f64 = 0.3;
+
 /// Is the tooth passing too weak against its double for any cut of this immersion? So it is where the spindle ran at twice the
-/// stated speed: the double is the tooth passing then, and
-/// what stands at half of it, runout; then it is the strongest line, too (of a cutter with one tooth that cuts, the turn's is). `orders`, N, and their `std`: 1..=2N.
+/// stated speed, or with twice the teeth: the double is the tooth passing then, and what stands at half of it, runout. Then it is the
+/// strongest line, too (of a cutter with one tooth that cuts, the turn's is); or, of a tool that runs out much, the tooth passing is
+/// weak against the mean force as well. `orders`, N, and their `std`: 1..=2N; `mean` where the zero is known, N.
 pub(crate) fn tooth_passing_too_weak(
     cut: &MillingCut,
     orders: [&[Complex64]; 2],
     std: [&[f64]; 2],
+    mean: Option<[f64; 2]>,
 ) -> Option<TwiceOverOnce> {
     let teeth = cut.teeth;
-    if teeth < 2 || orders.iter().any(|o| o.len() < 2 * teeth) {
+    if teeth < 1 || orders.iter().any(|o| o.len() < 2 * teeth) {
         return None;
     }
     let unit = cut.closed_form(2 * teeth);
@@ -132,7 +132,16 @@ pub(crate) fn tooth_passing_too_weak(
     // What noise hides of the tooth passing is granted it.
     let measured = (twice / (once + noise(teeth))).sqrt();
     let is_strongest = (1..2 * teeth).all(|k| power(k) < twice);
-    let told = is_strongest
+    let lacks = mean.is_some_and(|mean| {
+        let n = teeth as f64;
+        let single = single_tooth(cut).closed_form(teeth);
+        let promised = direction(&single, n, orders, mean, true).map(|(k_t, k_r)| {
+            let axis = |a: usize| (single[0][a][teeth] * k_t + single[1][a][teeth] * k_r).norm_sqr();
+            n * n * (axis(0) + axis(1))
+        });
+        promised.is_some_and(|promised| once < LACKING * LACKING * promised)
+    });
+    let told = (is_strongest || lacks)
         && twice > CERTAIN * CERTAIN * noise(2 * teeth)
         && measured > FAR_ABOVE * at_most.max(WEAK);
     (told && measured.is_finite()).then_some(TwiceOverOnce { measured, at_most })
@@ -141,6 +150,8 @@ pub(crate) fn tooth_passing_too_weak(
 /// Power of all orders out of step with the parts of a turn, over that of the orders in step, below which the turn consists of such
 /// parts: no tool is mounted so well that nothing comes back once per turn while lines between that and the tooth passing do.
 const OUT_OF_STEP: f64 = 0.03;
+/// Power of the strongest order in step over that of the strongest of all, at least: teeth that merely differ a little stay below it.
+const IN_STEP: f64 = 0.02;
 /// Where the zero is not known: times the power of any other order that the strongest one must have.
 const ABOVE_OTHERS: f64 = 2.0;
 
@@ -157,6 +168,7 @@ pub(crate) fn parts_of_turn(
     let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
     let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
     let count = orders.iter().map(|o| o.len()).min()?;
+    let strongest_of_all = (1..=count).map(power).fold(0.0, f64::max);
     (2..teeth).rev().filter(|m| teeth.is_multiple_of(*m)).find(|m| {
         let in_step = |k: &usize| k.is_multiple_of(*m) && !k.is_multiple_of(teeth);
         let strongest = (1..=count).filter(in_step).map(power).fold(0.0, f64::max);
@@ -167,7 +179,8 @@ pub(crate) fn parts_of_turn(
         let outside: f64 = (1..=count).filter(|k| !k.is_multiple_of(*m)).map(power).sum();
         let others = (1..=count).filter(|k| !in_step(k)).map(power).fold(0.0, f64::max);
         let stands_out = !zero_is_known && strongest > ABOVE_OTHERS * others;
-        is_certain && (outside < OUT_OF_STEP * inside || stands_out)
+        let is_strong = strongest > IN_STEP * strongest_of_all;
+        is_certain && is_strong && (outside < OUT_OF_STEP * inside || stands_out)
     })
 }
 
@@ -196,12 +209,7 @@ pub(crate) fn tooth_back_mm(
         return None;
     }
     let n = teeth as f64;
-    let single = MillingCut {
-        teeth: 1,
-        places: Vec::new(),
-        ..cut.clone()
-    };
-    let unit = single.closed_form(teeth);
+    let unit = single_tooth(cut).closed_form(teeth);
     let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
     let even_chip = |k: usize| -> f64 {
         let axis = |axis: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
@@ -228,6 +236,14 @@ pub(crate) fn tooth_back_mm(
     };
     let told = back > part * cut.feed_per_tooth_mm && power > CERTAIN * CERTAIN * noise;
     (told && back.is_finite()).then_some(back)
+}
+
+fn single_tooth(cut: &MillingCut) -> MillingCut {
+    MillingCut {
+        teeth: 1,
+        places: Vec::new(),
+        ..cut.clone()
+    }
 }
 
 /// Tangential and radial force for a chip of 1 mm and 1 mm of depth, as the means have it; with an unknown zero as the
@@ -300,6 +316,9 @@ mod tests {
         assert_eq!(parts(set_back, false), None);
         let even = [0.3, 0.2, 0.3, 900.0, 0.2, 0.1, 0.2, 200.0];
         assert_eq!(parts(even, false), None);
+        // Certain, and a hundredth of the tooth passing: every second tooth a little shorter.
+        let alternating = [0.0, 15.0, 0.0, 900.0, 0.0, 0.1, 0.0, 200.0];
+        assert_eq!(parts(alternating, true), None);
         // Of a prime number of teeth there are no parts.
         let orders = vec![Complex64::ONE; 6];
         assert_eq!(
@@ -449,7 +468,40 @@ mod tests {
             (1..=2 * teeth).map(of).collect()
         });
         let std = vec![0.01; 2 * teeth];
-        tooth_passing_too_weak(cut, [&orders[0], &orders[1]], [&std, &std])
+        tooth_passing_too_weak(cut, [&orders[0], &orders[1]], [&std, &std], None)
+    }
+
+    /// Four teeth told as two, and two as one, of a tool that runs out so much that the turn's line is the strongest.
+    #[test]
+    fn half_the_teeth_are_told_whatever_the_tool_runs_out() {
+        let coefficient = [900.0, 350.0, 0.0, 15.0, 18.0, 0.0];
+        for (start, exit) in [(0.0, 180.0), (0.0, 70.0), (150.0, 180.0)] {
+            for stated in [1, 2, 3] {
+                let true_cut = cut(2 * stated, start, exit);
+                let unit = true_cut.closed_form(2 * stated);
+                let force = |axis: usize, k: usize| -> Complex64 {
+                    let passing: Complex64 = (0..6).map(|c| unit[c][axis][k] * coefficient[c]).sum();
+                    // An axis offset makes the turn's line and those beside the tooth passing.
+                    let turn = [1, 2 * stated - 1].contains(&k) && stated > 1;
+                    passing + if turn { 300.0.into() } else { Complex64::ZERO }
+                };
+                let orders: [Vec<Complex64>; 2] =
+                    [0, 1].map(|axis| (1..=2 * stated).map(|k| force(axis, k)).collect());
+                let std = vec![0.01; 2 * stated];
+                let mean = [0, 1].map(|axis| force(axis, 0).re);
+                let told = |cut: &MillingCut, mean: Option<[f64; 2]>| {
+                    tooth_passing_too_weak(cut, [&orders[0], &orders[1]], [&std, &std], mean).is_some()
+                };
+                // What is stated has half the teeth at twice the feed.
+                let stated_cut = MillingCut {
+                    teeth: stated,
+                    feed_per_tooth_mm: 0.2,
+                    ..true_cut.clone()
+                };
+                assert!(told(&stated_cut, Some(mean)), "{stated}: {start}–{exit}");
+                assert_eq!(told(&stated_cut, None), stated == 1, "{stated}: {start}–{exit}");
+            }
+        }
     }
 
     #[test]

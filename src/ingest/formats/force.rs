@@ -307,22 +307,27 @@ const INTERVALS: [&str; 14] = [
     "采样间隔",
 ];
 
-/// `Sampling rate [Hz]:,10000`, `# fs = 5 kHz`, `dt,0.0002`, `Sample interval [ms];0,2` and their relatives, Hz.
+/// `Sampling rate [Hz]:,10000`, `# fs = 5 kHz`, `dt,0.0002`, `Sample interval [ms];0,2` and their relatives, Hz; also in a table of
+/// settings above the rows, whose values stand below their names.
 fn sampling_rate(header: &Header) -> Option<f64> {
+    let clean = |text: &str| -> String {
+        text.trim_matches(|c: char| c.is_whitespace() || ":;,=\"".contains(c))
+            .into()
+    };
     let entries = header.lines.iter().enumerate().filter_map(|(i, line)| {
         let line = line.trim_start_matches(['#', '%', '/', '*', ' ', '"']);
         let at = line.find([':', ';', '\t', ',', '='])?;
         let (key, value) = line.split_at(at);
-        let clean = |text: &str| -> String {
-            text.trim_matches(|c: char| c.is_whitespace() || ":;,=\"".contains(c))
-                .into()
-        };
         let value = clean(value);
         // SignalExpress writes the value below its key.
         let below = || header.lines.get(i + 1).map(|l| clean(l)).unwrap_or_default();
         Some((key.trim(), if value.is_empty() { below() } else { value }))
     });
-    entries.into_iter().find_map(|(key, value)| {
+    let settings = header.lines.windows(2).flat_map(|rows| {
+        let keys = rows[0].split('\t').map(str::trim);
+        keys.zip(rows[1].split('\t').map(clean))
+    });
+    entries.chain(settings).find_map(|(key, value)| {
         let lower = key.to_lowercase();
         let base = lower.split(['[', '(']).next().unwrap_or_default().trim();
         let is_rate = RATES.iter().any(|k| lower.contains(k)) || ["fs", "sr", "f_s", "rate"].contains(&base);

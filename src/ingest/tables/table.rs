@@ -49,7 +49,7 @@ impl Header {
     /// Finds where the numbers begin and how they are separated; `None` where the text holds no table.
     pub fn find(bytes: &[u8]) -> Option<Header> {
         let mut lines = Lines::new(bytes);
-        let mut above: Vec<String> = Vec::new();
+        let mut above: Vec<String> = last_section(&mut lines);
         let (data_at, data_line) = loop {
             let at = lines.position;
             let line = lines.next()?;
@@ -696,6 +696,22 @@ pub(crate) fn holds(data: &[u8], byte: u8) -> bool {
 /// True where a comma separated file writes its decimal commas in quotes.
 fn quoted_commas(data: &[u8]) -> bool {
     holds(data, b'"') && !holds(data, b'.')
+}
+
+/// Lines up to the title of the last section, where a file has titled sections (`*** Results ***`, as Setitec's drilling units write
+/// them): tables of settings come first, what was recorded comes last. Leaves `lines` behind that title.
+fn last_section(lines: &mut Lines) -> Vec<String> {
+    let is_title = |line: &[u8]| {
+        let line = line.trim_ascii();
+        line.len() > 6 && line.starts_with(b"***") && line.ends_with(b"***")
+    };
+    if !lines.clone().next().is_some_and(is_title) {
+        return Vec::new();
+    }
+    let titles = lines.clone().take(HEADER_LINES_AT_MOST).enumerate();
+    let last = titles.filter(|(_, line)| is_title(line)).last();
+    let count = last.map_or(0, |(at, _)| at + 1);
+    lines.take(count).map(decode).collect()
 }
 
 fn find_delimiter(names: Option<&str>, first_row: &str, data: &[u8]) -> Delimiter {

@@ -3,9 +3,10 @@
 
 use std::path::Path;
 
-use super::contents::{Contents, Digest, Format, MeasurementFile};
+use super::contents::{Contents, Digest, Format, MeasurementFile, TimeFile};
 use super::decode::read_bytes_at;
-use super::read::{self, TimeFile, no_such, read_file};
+use super::long::{self, ForceFile, Opened};
+use super::read::{self, no_such, read_file};
 use super::text::{Notes, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
 use crate::data::{Channel, ChannelRole, TimeRecord};
@@ -119,10 +120,51 @@ impl Gain {
 /// # Errors
 /// Those of [`super::read_time`]; a channel that is not there, or not in the unit that its rule needs.
 pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
+    with_rules(path, rules, read_file(path))
+}
+
+/// As [`read_time_with`], for the forces alone; those of a long file in half the memory.
+///
+/// # Errors
+/// As [`read_time_with`].
+pub fn read_forces_with(path: &Path, rules: &[ChannelRule]) -> Result<ForceFile> {
+    let file = match long::open(path) {
+        Ok(Opened::Long(long)) => {
+            let is_named = |rule: &ChannelRule| rule.rate_hz.is_none() && rule.measures != Measures::Time;
+            if !rules.iter().all(is_named) {
+                return with_rules(path, rules, long.whole()).map(ForceFile::Short);
+            }
+            let mut told = Vec::new();
+            let mut file = long.forces(|piece| {
+                let mut piece = piece;
+                if !rules.is_empty() {
+                    let (record, warnings) = forces_by(path, rules, vec![piece])?;
+                    piece = record;
+                    told = warnings;
+                }
+                piece.keep_forces();
+                Ok(piece)
+            })?;
+            match &mut file {
+                ForceFile::Short(file) => file.warnings.extend(told),
+                ForceFile::Long(file) => file.warnings.extend(told),
+            }
+            return Ok(file);
+        }
+        Ok(Opened::Read(file)) => Ok(file),
+        Err(error) => Err(error),
+    };
+    let mut file = with_rules(path, rules, file)?;
+    file.record.keep_forces();
+    Ok(ForceFile::Short(file))
+}
+
+/// `file`: as it was read from `path`, or why it was not.
+fn with_rules(path: &Path, rules: &[ChannelRule], file: Result<MeasurementFile>) -> Result<TimeFile> {
     if rules.is_empty() {
-        return read::read_time_file(path);
+        return read::one_time_record(path, file?);
     }
-    let (mut times, mut warnings, digest) = match read_file(path) {
+    let (mut times, mut warnings, digest) = match file {
         Ok(file) if !file.contents.times.is_empty() => (file.contents.times, file.warnings, file.digest),
         other => {
             match with_rate(path, rules)?
@@ -139,6 +181,21 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
         }
     };
     warnings.extend(stated_rate(path, rules, &mut times)?);
+    let (record, told) = forces_by(path, rules, times)?;
+    warnings.extend(told);
+    Ok(TimeFile {
+        record,
+        warnings,
+        digest,
+    })
+}
+
+/// That of the records which holds all channels that the rules name, its forces as they have them; and what was assumed.
+fn forces_by(
+    path: &Path,
+    rules: &[ChannelRule],
+    times: Vec<TimeRecord>,
+) -> Result<(TimeRecord, Vec<String>)> {
     let forces: Vec<&ChannelRule> = rules
         .iter()
         .filter(|r| matches!(r.measures, Measures::Force(_)))
@@ -164,12 +221,8 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
         .remedy("write the channel's name as the file has it after in_file, or its place after column")
         .into());
     };
-    warnings.extend(apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?);
-    Ok(TimeFile {
-        record,
-        warnings,
-        digest,
-    })
+    let told = apply(&mut record, &forces).map_err(|e| Error::from(e.file(path)))?;
+    Ok((record, told))
 }
 
 /// As [`read_file`]; a table of text or a file of arrays that says neither times nor a rate was sampled at `rate_hz`, where that is known.

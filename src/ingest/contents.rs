@@ -151,6 +151,17 @@ pub struct MeasurementFile {
     pub digest: Digest,
 }
 
+/// The one time record of a file.
+#[derive(Debug, Clone)]
+pub struct TimeFile<S = f64> {
+    /// Its channels.
+    pub record: TimeRecord<S>,
+    /// What was assumed, contradicted or left out.
+    pub warnings: Vec<String>,
+    /// Of the file's content.
+    pub digest: Digest,
+}
+
 impl Contents {
     /// Names and units of files are shown on terminals: control characters in them become visible.
     pub(super) fn show_control_characters(&mut self) {

@@ -1,7 +1,7 @@
 //! Which format a file has, by what stands in it.
 
 use super::contents::Format;
-use super::preview::{columns, preview};
+use super::preview::{columns, lines_for_names, preview};
 use super::text::{self, Lines};
 use crate::InputError;
 use crate::ingest::formats::force;
@@ -162,12 +162,18 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         ));
     }
     let problem = format!("columns of unknown meaning ({})", abbreviated(&header.names));
+    let mut remedy = "put a line of column names on top: frequency_hz,re,im for an FRF, time_s,force_n,acc_m_per_s2 for a tap test, \
+         time_s,fx_n,fy_n,fz_n for cutting forces (without a time column: rate_hz in a [[channel]] of campaign.toml)"
+        .to_owned();
+    if let Some(lines) = lines_for_names(bytes, &header) {
+        remedy += &format!(
+            "; or, where they are cutting forces, say in campaign.toml which is which (gain_n_per_unit for values without a unit), such \
+             as{lines}"
+        );
+    }
     Err(InputError::new(problem)
         .line(header.data_line.saturating_sub(1).max(1))
-        .remedy(
-            "put a line of column names on top: frequency_hz,re,im for an FRF, time_s,force_n,acc_m_per_s2 for a tap test, \
-             time_s,fx_n,fy_n,fz_n for cutting forces (without a time column: rate_hz in a [[channel]] of campaign.toml)",
-        ))
+        .remedy(remedy))
 }
 
 fn abbreviated(names: &[String]) -> String {

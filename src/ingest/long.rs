@@ -4,20 +4,22 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::contents::{Contents, Digest, Format, MeasurementFile};
+use super::contents::{Contents, Digest, Format, MeasurementFile, TimeFile};
 use super::decode::{dofs_from_file_name, read_bytes};
 use super::detect::{self, Detected};
 use super::quality::{QualityCheck, quality_warnings};
 use super::text::{self, Notes};
-use crate::data::TimeRecord;
+use crate::data::{Channel, Sample, TimeRecord};
 use crate::files::regular_file;
 use crate::ingest::formats::force::Pieces;
 use crate::ingest::tables::table::{Table, holds};
 use crate::progress::Progress;
-use crate::{Error, Result};
+use crate::{Error, InputError, Result};
 
 /// Bytes of text up to which a file is read as a whole: a record of 150 s, 4 channels and 10 kHz.
 const SHORT: usize = 64 << 20;
+/// The same where nothing but a survey is wanted: what is not kept needs no memory, and memory costs more time than reading.
+const SHORT_FOR_SURVEY: usize = 8 << 20;
 /// Bytes of text held at once of a longer one: few enough for text and numbers to stay in the processor's cache between one
 /// look at them and the next.
 const PIECE: usize = 4 << 20;
@@ -26,6 +28,20 @@ const PIECE: usize = 4 << 20;
 pub(super) enum Opened {
     Read(MeasurementFile),
     Long(Box<LongRecord>),
+}
+
+/// The force record of a file.
+pub enum ForceFile {
+    /// As it was read.
+    Short(TimeFile),
+    /// Of a long file, whose samples would need about as much memory as its text.
+    Long(TimeFile<f32>),
+}
+
+/// Do samples that differ from their neighbours still do so with seven digits? Then these tell all that the recorder told.
+fn is_told_by_half(samples: &[f64]) -> bool {
+    let mut pairs = samples.windows(2);
+    pairs.all(|w| w[0] == w[1] || w[0] as f32 != w[1] as f32)
 }
 
 /// A time table of more than [`SHORT`] bytes.
@@ -86,17 +102,29 @@ pub struct Survey {
 /// # Errors
 /// As [`super::read_file`].
 pub fn survey(path: &Path) -> Result<Survey> {
-    let mut long = match open(path)? {
-        Opened::Read(file) => {
-            let times = &file.contents.times;
-            return Ok(Survey {
-                samples: times.iter().map(TimeRecord::len).collect(),
-                quality: times.iter().flat_map(quality_warnings).collect(),
-                file,
-            });
+    let of_file = |file: MeasurementFile| {
+        let times = &file.contents.times;
+        Survey {
+            samples: times.iter().map(TimeRecord::len).collect(),
+            quality: times.iter().flat_map(quality_warnings).collect(),
+            file,
         }
-        Opened::Long(long) => long,
     };
+    match open_by(path, SHORT_FOR_SURVEY, PIECE)? {
+        Opened::Read(file) => Ok(of_file(file)),
+        // Some can be read as a whole only, those with uneven times among them.
+        Opened::Long(long) if long.bytes <= SHORT as u64 => {
+            survey_by_pieces(*long).or_else(|_| read_at_once(path).map(of_file))
+        }
+        Opened::Long(long) => survey_by_pieces(*long),
+    }
+}
+
+fn read_at_once(path: &Path) -> Result<MeasurementFile> {
+    decoded(path, &std::fs::read(path).map_err(|e| Error::io(path, e))?)
+}
+
+fn survey_by_pieces(mut long: LongRecord) -> Result<Survey> {
     let mut check: Option<QualityCheck> = None;
     let (mut first, mut rows) = (None, 0);
     let mut next = long.next_piece()?;
@@ -257,28 +285,73 @@ impl LongRecord {
 
     /// All pieces in one record.
     pub(super) fn whole(mut self) -> Result<MeasurementFile> {
-        let mut whole: Option<TimeRecord> = None;
+        let times = match self.next_piece()? {
+            Some(first) => vec![self.joined(first, &mut Ok)?],
+            None => Vec::new(),
+        };
+        Ok(self.file_with(times))
+    }
+
+    /// What `each` makes of the pieces, in one record: in half the memory where that loses nothing.
+    pub(super) fn forces(
+        mut self,
+        mut each: impl FnMut(TimeRecord) -> Result<TimeRecord>,
+    ) -> Result<ForceFile> {
+        let first = self.next_piece()?;
+        let first = first.ok_or_else(|| InputError::new("a time table without rows").file(&self.path))?;
+        let first = each(first)?;
+        if first.channels.iter().all(|c| is_told_by_half(&c.samples)) {
+            let record = self.joined(first, &mut each)?;
+            Ok(ForceFile::Long(self.time_file(record)))
+        } else {
+            let record = self.joined(first, &mut each)?;
+            Ok(ForceFile::Short(self.time_file(record)))
+        }
+    }
+
+    /// The piece read last and those after it.
+    fn joined<S: Sample>(
+        &mut self,
+        first: TimeRecord,
+        each: &mut impl FnMut(TimeRecord) -> Result<TimeRecord>,
+    ) -> Result<TimeRecord<S>> {
+        let expected = self.expected_samples();
+        let with_room = |channel: Channel| {
+            let mut samples = Vec::with_capacity((expected + expected / 50).max(channel.samples.len()));
+            samples.extend(channel.samples.into_iter().map(S::of));
+            Channel {
+                name: channel.name,
+                file_unit: channel.file_unit,
+                role: channel.role,
+                samples,
+            }
+        };
+        let mut record = TimeRecord {
+            sample_rate_hz: first.sample_rate_hz,
+            start_s: first.start_s,
+            channels: first.channels.into_iter().map(with_room).collect(),
+            filled: first.filled,
+        };
         while let Some(piece) = self.next_piece()? {
-            let Some(record) = &mut whole else {
-                let expected = self.expected_samples();
-                let record = whole.insert(piece);
-                for channel in &mut record.channels {
-                    channel
-                        .samples
-                        .reserve_exact((expected + expected / 50).saturating_sub(channel.samples.len()));
-                }
-                continue;
-            };
+            let piece = each(piece)?;
             let at = record.len();
             record
                 .filled
                 .extend(piece.filled.iter().map(|r| r.start + at..r.end + at));
             for (channel, more) in record.channels.iter_mut().zip(piece.channels) {
-                channel.samples.extend_from_slice(&more.samples);
+                channel.samples.extend(more.samples.iter().map(|v| S::of(*v)));
                 self.pieces.spare.push(more.samples);
             }
         }
-        Ok(self.file_with(whole.into_iter().collect()))
+        Ok(record)
+    }
+
+    fn time_file<S>(self, record: TimeRecord<S>) -> TimeFile<S> {
+        TimeFile {
+            record,
+            warnings: self.notes.into_warnings(),
+            digest: self.text.digest,
+        }
     }
 
     fn file_with(self, times: Vec<TimeRecord>) -> MeasurementFile {
@@ -319,6 +392,36 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         file
+    }
+
+    #[test]
+    fn half_the_memory_holds_what_seven_digits_tell() {
+        let file = log(|_| ());
+        let whole = super::super::read_file(file.path()).unwrap();
+        let record = &whole.contents.times[0];
+        let opened = open_by(file.path(), 4096, 4096).unwrap();
+        let Opened::Long(long) = opened else {
+            panic!("read as a whole")
+        };
+        let ForceFile::Long(narrow) = long.forces(Ok).unwrap() else {
+            panic!("four digits need no more than seven")
+        };
+        assert_eq!(narrow.record.filled, record.filled);
+        assert_eq!(narrow.digest, whole.digest);
+        for (a, b) in record.channels.iter().zip(&narrow.record.channels) {
+            assert_eq!(
+                (&a.name, a.role, a.samples.len()),
+                (&b.name, b.role, b.samples.len())
+            );
+            let pairs = a.samples.iter().zip(&b.samples);
+            assert!(
+                pairs
+                    .clone()
+                    .all(|(a, b)| (a - b.value()).abs() <= 1e-7 * a.abs())
+            );
+        }
+        assert!(is_told_by_half(&[1e4, 1e4, 1.0001e4]));
+        assert!(!is_told_by_half(&[1e4, 1e4 + 1e-5]));
     }
 
     fn by_pieces(path: &Path, piece: usize) -> Result<MeasurementFile> {

@@ -23,10 +23,10 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{
-    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, read_file_at, read_time_with,
-    timeless, unit_of_charge_or_other,
+    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, read_file_at, read_forces_with,
+    read_time_with, timeless, unit_of_charge_or_other,
 };
-pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord};
+pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord, TimeFile};
 pub use formats::columns::{
     Cells, ColumnTable, MOST_ROWS, NamedArray, NamedColumn, csv_bytes, mat_bytes, npz_bytes, variable_name,
     xlsx_bytes,
@@ -37,10 +37,10 @@ pub use formats::uff::{
     Abscissa, ByteOrder, Dataset58, Encoding58, EntityDof, Ordinate, UnitAxis, frf_dataset, time_datasets,
     uff58_bytes, write_datasets58, write_uff58,
 };
-pub use long::{Survey, survey};
+pub use long::{ForceFile, Survey, survey};
 pub use preview::{PlainColumn, SIGNALS, plain_columns, taken_for};
 pub use quality::quality_warnings;
-pub use read::{TimeFile, read_file, read_frf_file, read_frfs, read_memory, read_time};
+pub use read::{read_file, read_frf_file, read_frfs, read_memory, read_time};
 pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer, is_called_marker};
 pub use text::shown;
 

@@ -1,10 +1,11 @@
-//! Tables without names: what is in them, and what to write so that they get names.
+//! Tables whose columns have no names, or names that say nothing: what is in them, and what to write so that they become forces.
 
 use std::io::Read;
 use std::path::Path;
 
 use super::text::{Notes, without_byte_order_mark};
 use super::units;
+use crate::ingest::formats::force;
 use crate::ingest::tables::table::Header;
 use crate::{Error, Result};
 
@@ -17,9 +18,11 @@ const MANY: usize = 200;
 /// Bytes read of a file to see them.
 const START: u64 = 1 << 20;
 
-/// A column of a table without names, as its first rows show it.
+/// A column of such a table, as its first rows show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlainColumn {
+    /// What the file calls it; `None` in a table without names.
+    pub name: Option<String>,
     /// Least and greatest value, in the unit of the file.
     pub range: [f64; 2],
     /// Step of the first column where it rises evenly, as times do; in the unit of the file.
@@ -31,7 +34,7 @@ pub struct PlainColumn {
 }
 
 impl PlainColumn {
-    fn of(values: &[f64], is_first: bool) -> PlainColumn {
+    fn of(name: Option<&String>, values: &[f64], is_first: bool) -> PlainColumn {
         let even = || -> Option<f64> {
             let [first, .., last] = values else { return None };
             let step = (last - first) / (values.len() - 1) as f64;
@@ -47,11 +50,22 @@ impl PlainColumn {
                 (a.min(*v), b.max(*v))
             });
         PlainColumn {
+            name: name.cloned(),
             range: [low, high],
             step: even().filter(|_| is_first),
             rises: values.is_sorted_by(|a, b| a < b),
             rows: values.len(),
         }
+    }
+
+    /// Does it count the rows (or milliseconds)? Then it is no time in seconds, and the rate must be said.
+    pub fn counts(&self) -> bool {
+        self.step == Some(1.0) && self.range[0].fract() == 0.0
+    }
+
+    /// Is it the times of the samples?
+    pub fn is_clock(&self) -> bool {
+        self.step.is_some() && !self.counts()
     }
 
     /// That only the file's start was looked at, where it is longer: a cut that begins later is not in the range.
@@ -65,6 +79,7 @@ impl PlainColumn {
     /// `rises by 0.0001 (time?)`, `-0.12 to 3.4`.
     pub fn describe(&self) -> String {
         match self.step {
+            Some(_) if self.counts() => "counts the rows, or milliseconds".to_owned(),
             Some(step) => format!("rises by {} (time?)", units::figures(step, 4)),
             None => format!(
                 "{} to {}",
@@ -78,23 +93,26 @@ impl PlainColumn {
 /// Signals in the order in which recorders write them.
 pub const SIGNALS: [&str; 4] = ["fx", "fy", "fz", "mz"];
 
-/// What each column of a force record is taken for: a clock for `time`, all else for [`SIGNALS`] in their order. Ends where
-/// these do; where there are more columns than these, what follows the three forces is as likely an accelerometer as a torque.
-pub fn taken_for(columns: &[PlainColumn]) -> impl Iterator<Item = (&PlainColumn, &'static str)> {
+/// What each column of a force record is taken for, with its place from 1: a clock for `time`, one that counts for nothing, all else
+/// for [`SIGNALS`] in their order. Ends where these do; where there are more columns than these, what follows the three forces is as
+/// likely an accelerometer as a torque.
+pub fn taken_for(columns: &[PlainColumn]) -> impl Iterator<Item = (usize, &PlainColumn, &'static str)> {
     let count = columns.iter().filter(|c| c.step.is_none()).count();
     let mut signals = SIGNALS
         .into_iter()
         .take(if count > SIGNALS.len() { 3 } else { SIGNALS.len() });
-    columns.iter().map_while(move |column| {
-        let name = match column.step {
-            Some(_) => "time",
-            None => signals.next()?,
+    let own = columns.iter().enumerate().filter(|(_, c)| !c.counts());
+    own.map_while(move |(i, column)| {
+        let name = if column.is_clock() {
+            "time"
+        } else {
+            signals.next()?
         };
-        Some((column, name))
+        Some((i + 1, column, name))
     })
 }
 
-/// The columns of a file that is a table of numbers without names; `None` for all else.
+/// The columns of a file that is a table of numbers without times, or without names at all; `None` for all else.
 ///
 /// # Errors
 /// The operating system's.
@@ -108,7 +126,8 @@ pub fn plain_columns(path: &Path) -> Result<Option<Vec<PlainColumn>>> {
     if text.contains(&0) {
         return Ok(None);
     }
-    let found = Header::find(&text[..whole]).filter(|header| header.names.is_empty());
+    let is_plain = |header: &Header| header.names.is_empty() || !force::is_time_table(header);
+    let found = Header::find(&text[..whole]).filter(is_plain);
     Ok(found.map(|header| columns(&text[..whole], &header)))
 }
 
@@ -119,8 +138,39 @@ pub(super) fn columns(bytes: &[u8], header: &Header) -> Vec<PlainColumn> {
         .map_or(bytes.len(), |at| header.data_at + at + 1);
     let table = header.read(&bytes[..end], None, &mut Notes::default());
     let columns = table.map_or_else(|_| Vec::new(), |t| t.columns);
-    let of = |(i, values): (usize, &Vec<f64>)| PlainColumn::of(values, i == 0);
+    let of = |(i, values): (usize, &Vec<f64>)| PlainColumn::of(header.names.get(i), values, i == 0);
     columns.iter().enumerate().map(of).collect()
+}
+
+/// The lines of `campaign.toml` that make forces of the columns.
+fn channel_lines(columns: &[PlainColumn]) -> String {
+    let mut lines = String::new();
+    let mut has_time = false;
+    for (place, column, name) in taken_for(columns) {
+        let source = match &column.name {
+            Some(own) => format!("in_file = {own:?}"),
+            None => format!("column = {place}"),
+        };
+        let gain = match column.is_clock() {
+            true => "unit = \"s\"",
+            false => "unit = \"V\"\ngain = \"500 N/V\"",
+        };
+        has_time |= column.is_clock();
+        lines += &format!("\n[[channel]]\nname = \"{name}\"\n{source}\n{gain}");
+        if !has_time {
+            lines += "\nrate_hz = 10000.0";
+            has_time = true;
+        }
+    }
+    lines
+}
+
+/// For columns whose names say nothing: the lines of `campaign.toml` that make forces of them, where they may be such.
+pub(super) fn lines_for_names(bytes: &[u8], header: &Header) -> Option<String> {
+    let columns = columns(bytes, header);
+    let signals = columns.iter().filter(|c| c.step.is_none()).count();
+    let may_be = (1..=SHOWN).contains(&signals) && columns.iter().all(|c| !c.rises || c.step.is_some());
+    may_be.then(|| channel_lines(&columns))
 }
 
 /// What a table without names holds, and the lines of `campaign.toml` that give it names.
@@ -130,20 +180,7 @@ pub(super) fn preview(bytes: &[u8], header: &Header) -> (String, String) {
     let seen: Vec<String> = seen
         .map(|(i, column)| format!("{}: {}", i + 1, column.describe()))
         .collect();
-    let mut lines = String::new();
-    let mut has_time = false;
-    for (i, (column, name)) in taken_for(&columns).enumerate() {
-        let gain = match column.step {
-            Some(_) => "unit = \"s\"",
-            None => "unit = \"V\"\ngain = \"500 N/V\"",
-        };
-        has_time |= column.step.is_some();
-        lines += &format!("\n[[channel]]\nname = \"{name}\"\ncolumn = {}\n{gain}", i + 1);
-        if !has_time {
-            lines += "\nrate_hz = 10000.0";
-            has_time = true;
-        }
-    }
+    let lines = channel_lines(&columns);
     let more = match seen.len().saturating_sub(SHOWN) {
         0 => String::new(),
         n => format!("; and {n} more"),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::contents::{Digest, MeasurementFile};
+use super::contents::{Digest, MeasurementFile, TimeFile};
 use super::decode::read_bytes;
 use super::long;
 use super::text::Notes;
@@ -67,19 +67,11 @@ pub fn read_time(path: &Path) -> Result<(TimeRecord, Vec<String>)> {
     Ok((read.record, read.warnings))
 }
 
-/// The one time record of a file.
-#[derive(Debug, Clone)]
-pub struct TimeFile {
-    /// Its channels.
-    pub record: TimeRecord,
-    /// What was assumed, contradicted or left out.
-    pub warnings: Vec<String>,
-    /// Of the file's content.
-    pub digest: Digest,
+pub(super) fn read_time_file(path: &Path) -> Result<TimeFile> {
+    one_time_record(path, read_file(path)?)
 }
 
-pub(super) fn read_time_file(path: &Path) -> Result<TimeFile> {
-    let mut file = read_file(path)?;
+pub(super) fn one_time_record(path: &Path, mut file: MeasurementFile) -> Result<TimeFile> {
     match (file.contents.times.pop(), file.contents.times.len()) {
         (Some(record), 0) => Ok(TimeFile {
             record,

@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::blocks::{line, mean, robust_std};
+use crate::data::Sample;
 
 /// Part of the cut's tooth-passing power that air may hold: unbalance and what resonates with it stay below a third of
 /// the cut's amplitude, a cut that wanders never falls there.
@@ -27,7 +28,7 @@ const MOST_TURNS: usize = 60;
 
 /// What comes back one turn later (covariance of neighbouring turns, each less its mean), and all fluctuation within turns;
 /// both summed over the channels. `None` with less than two turns.
-pub(super) fn content(channels: &[&[f64]], range: &Range<usize>, turn: f64) -> Option<(f64, f64)> {
+pub(super) fn content<S: Sample>(channels: &[&[S]], range: &Range<usize>, turn: f64) -> Option<(f64, f64)> {
     let turns = (range.len() as f64 / turn + 1e-6).floor() as usize;
     let length = turn.floor() as usize;
     if turns < 2 || length < 2 {
@@ -40,8 +41,8 @@ pub(super) fn content(channels: &[&[f64]], range: &Range<usize>, turn: f64) -> O
             let value = |i: usize| {
                 let at = from + i as f64;
                 let (low, share) = (at.floor() as usize, at - at.floor());
-                let next = samples[(low + 1).min(samples.len() - 1)];
-                samples[low.min(samples.len() - 1)] * (1.0 - share) + next * share
+                let at = |i: usize| samples[i.min(samples.len() - 1)].value();
+                at(low) * (1.0 - share) + at(low + 1) * share
             };
             let values: Vec<f64> = (0..length).map(value).collect();
             let m = mean(&values);
@@ -61,7 +62,7 @@ pub(super) fn content(channels: &[&[f64]], range: &Range<usize>, turn: f64) -> O
 }
 
 /// Level of each turn of one channel, off a line through them: (mean, change along the line, scatter about it).
-fn level(samples: &[f64], range: &Range<usize>, turn: f64) -> (f64, f64, f64) {
+fn level<S: Sample>(samples: &[S], range: &Range<usize>, turn: f64) -> (f64, f64, f64) {
     let turns = ((range.len() as f64 / turn + 1e-6).floor() as usize).max(1);
     let of = |k: usize| {
         let from = range.start + (k as f64 * turn).round() as usize;
@@ -80,8 +81,8 @@ fn level(samples: &[f64], range: &Range<usize>, turn: f64) -> (f64, f64, f64) {
 }
 
 /// The part of `candidate` that is air next to the cut in `cutting`, if any. `turn`: samples a revolution.
-pub(super) fn air_in(
-    channels: &[&[f64]],
+pub(super) fn air_in<S: Sample>(
+    channels: &[&[S]],
     candidate: &Range<usize>,
     cutting: &Range<usize>,
     turn: f64,
@@ -129,7 +130,7 @@ pub(super) fn air_in(
 }
 
 /// Does the level of `air` stand off that of `core` in some channel?
-fn stands_off(channels: &[&[f64]], air: &Range<usize>, core: &Range<usize>, turn: f64) -> bool {
+fn stands_off<S: Sample>(channels: &[&[S]], air: &Range<usize>, core: &Range<usize>, turn: f64) -> bool {
     channels.iter().any(|samples| {
         let (a, change_a, scatter_a) = level(samples, air, turn);
         let (c, change_c, scatter_c) = level(samples, core, turn);

@@ -1,5 +1,6 @@
 //! A record cut into blocks of whole tool revolutions, and order statistics.
 
+use crate::data::Sample;
 use crate::statistics::quantile;
 
 /// Mean and fluctuation of each consecutive block of a channel.
@@ -16,8 +17,8 @@ pub struct SignalBlocks {
 
 impl SignalBlocks {
     /// Cuts `samples` into as many blocks as there are, their edges rounded to samples; a rest at the end is left out.
-    pub fn new(samples: &[f64], samples_per_block: f64) -> SignalBlocks {
-        SignalBlocks::of(samples.len(), |i| samples[i], samples_per_block)
+    pub fn new<S: Sample>(samples: &[S], samples_per_block: f64) -> SignalBlocks {
+        SignalBlocks::of(samples.len(), |i| samples[i].value(), samples_per_block)
     }
 
     /// The same of `samples` values that `value` makes of their index.
@@ -61,8 +62,8 @@ impl SignalBlocks {
 }
 
 /// Arithmetic mean; 0 of nothing.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
+pub fn mean<S: Sample>(values: &[S]) -> f64 {
+    values.iter().map(|v| v.value()).sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Middle of the sorted values, interpolated; 0 of nothing.
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn quantiles_interpolate_and_empty_input_is_harmless() {
         assert_eq!(median(&[]), 0.0);
-        assert!(SignalBlocks::new(&[], 10.0).is_empty());
+        assert!(SignalBlocks::new::<f64>(&[], 10.0).is_empty());
         assert!(SignalBlocks::new(&[1.0], 0.0).is_empty());
     }
 

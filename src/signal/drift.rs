@@ -7,6 +7,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 
 use super::blocks::{SignalBlocks, line, robust_std};
+use crate::data::Sample;
 
 /// Sample ranges in which the tool cut nothing.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -94,7 +95,7 @@ const STEP_SIGMA: f64 = 6.0;
 
 /// Fits the baseline of a channel to its air segments. Without air there is no line: offset and slope
 /// are zero and the flags say so. With air on one side only the line is extrapolated, its uncertainty with it.
-pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) -> DriftLine {
+pub fn fit_drift<S: Sample>(samples: &[S], sample_rate_hz: f64, start_s: f64, air: &Air) -> DriftLine {
     let mut drift = DriftLine {
         offset: 0.0,
         slope_per_s: 0.0,
@@ -119,9 +120,9 @@ pub fn fit_drift(samples: &[f64], sample_rate_hz: f64, start_s: f64, air: &Air) 
     for _ in 0..5 {
         let before = count(&kept);
         let each = || kept.iter().flat_map(Range::clone);
-        let (offset, slope, reference) = line(each().map(time), each().map(|i| samples[i]));
+        let (offset, slope, reference) = line(each().map(time), each().map(|i| samples[i].value()));
         (drift.offset, drift.slope_per_s, drift.reference_s) = (offset, slope, reference);
-        let residual = |i: usize| samples[i] - drift.at(time(i));
+        let residual = |i: usize| samples[i].value() - drift.at(time(i));
         let some: Vec<f64> = each()
             .step_by(before.div_ceil(ENOUGH_FOR_SCATTER))
             .map(residual)
@@ -175,9 +176,9 @@ fn inside(kept: &[Range<usize>], segment: &Range<usize>) -> impl Iterator<Item =
 
 /// Is the air before and after the cut two parallel lines rather than one? Then the zero jumped in between, and the line
 /// goes half-way.
-fn jump(
+fn jump<S: Sample>(
     drift: &mut DriftLine,
-    samples: &[f64],
+    samples: &[S],
     kept: &[Range<usize>],
     air: &Air,
     time: &impl Fn(usize) -> f64,
@@ -195,7 +196,7 @@ fn jump(
             let mean_of = |f: &dyn Fn(usize) -> f64| block().map(f).sum::<f64>() / per_block as f64;
             (
                 mean_of(&|i| time(i) - drift.reference_s),
-                mean_of(&|i| samples[i]),
+                mean_of(&|i| samples[i].value()),
                 side as f64,
             )
         }));
@@ -223,15 +224,15 @@ fn jump(
 }
 
 /// Standard errors from block means, since hum and bend make neighbouring samples alike.
-fn uncertainty(
+fn uncertainty<S: Sample>(
     drift: &mut DriftLine,
-    samples: &[f64],
+    samples: &[S],
     kept: &[Range<usize>],
     air: &Air,
     time: &impl Fn(usize) -> f64,
 ) {
     let each = || kept.iter().flat_map(Range::clone);
-    let residual = |i: usize| samples[i] - drift.at(time(i));
+    let residual = |i: usize| samples[i].value() - drift.at(time(i));
     let sample_variance = each().map(|i| residual(i).powi(2)).sum::<f64>() / count(kept) as f64;
     let (mut square_sum, mut block_count, mut block_len) = (0.0, 0usize, 0.0);
     let mut bent: Vec<(f64, f64)> = Vec::new();

@@ -3,6 +3,8 @@
 
 use std::ops::Range;
 
+use crate::data::Sample;
+
 /// What is wrong with the samples of one channel, as sample ranges in ascending order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Faults {
@@ -39,7 +41,7 @@ pub fn samples_in(ranges: &[Range<usize>], window: &Range<usize>) -> usize {
 }
 
 /// Looks for all of them.
-pub fn find_faults(samples: &[f64]) -> Faults {
+pub fn find_faults<S: Sample>(samples: &[S]) -> Faults {
     if samples.len() > 1 && samples.iter().all(|v| *v == samples[0]) {
         return Faults {
             dead: true,
@@ -61,7 +63,7 @@ pub fn find_faults(samples: &[f64]) -> Faults {
     let windowed = is_windowed(samples, &runs);
     let stands = |level: f64| {
         runs.iter()
-            .any(|run| run.len() >= PLATEAU && samples[run.start] == level)
+            .any(|run| run.len() >= PLATEAU && samples[run.start].value() == level)
     };
     let rests = |level: &f64| stands(*level) && is_rest(samples, *level);
     let at_rest: Vec<f64> = [range.0, range.1].into_iter().filter(rests).collect();
@@ -69,8 +71,8 @@ pub fn find_faults(samples: &[f64]) -> Faults {
     let clipped = |run: &Range<usize>| clipping.as_ref().is_some_and(|c| c.plateaus.contains(run));
     let stuck = runs
         .into_iter()
-        .filter(|run| run.len() >= STUCK && !clipped(run) && !(windowed && samples[run.start] == 0.0))
-        .filter(|run| !at_rest.contains(&samples[run.start]))
+        .filter(|run| run.len() >= STUCK && !clipped(run) && !(windowed && samples[run.start].value() == 0.0))
+        .filter(|run| !at_rest.contains(&samples[run.start].value()))
         .collect();
     Faults {
         dead: false,
@@ -90,7 +92,7 @@ const HELD: usize = 20;
 const ENOUGH_FOR_STATES: usize = 1000;
 
 /// A channel that knows a few values only rests at them and steps between them by nature.
-fn is_a_switch(samples: &[f64]) -> bool {
+fn is_a_switch<S: Sample>(samples: &[S]) -> bool {
     if samples.len() < ENOUGH_FOR_STATES {
         return false;
     }
@@ -103,7 +105,7 @@ fn is_a_switch(samples: &[f64]) -> bool {
     } else {
         STATES_HELD
     };
-    let mut states: Vec<f64> = Vec::with_capacity(most);
+    let mut states: Vec<S> = Vec::with_capacity(most);
     for sample in samples {
         // The one seen last is the likeliest.
         if let Some(at) = states.iter().rposition(|s| s == sample) {
@@ -120,10 +122,10 @@ fn is_a_switch(samples: &[f64]) -> bool {
 
 /// More than half of the samples are exactly zero, in long stretches: a force window left the contacts only (or a trigger
 /// the blocks). What freezes or drops out makes up a part of a record.
-fn is_windowed(samples: &[f64], runs: &[Range<usize>]) -> bool {
+fn is_windowed<S: Sample>(samples: &[S], runs: &[Range<usize>]) -> bool {
     let zeros = runs
         .iter()
-        .filter(|run| run.len() >= STUCK && samples[run.start] == 0.0);
+        .filter(|run| run.len() >= STUCK && samples[run.start].value() == 0.0);
     2 * zeros.map(|run| run.len()).sum::<usize>() > samples.len()
 }
 
@@ -131,7 +133,7 @@ fn is_windowed(samples: &[f64], runs: &[Range<usize>]) -> bool {
 const BLOCK: usize = 256;
 
 /// Runs of two and more equal samples. Measured values hardly ever repeat: most blocks hold none.
-fn runs(samples: &[f64]) -> Vec<Range<usize>> {
+fn runs<S: Sample>(samples: &[S]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for from in (0..samples.len().saturating_sub(1)).step_by(BLOCK) {
         let block = &samples[from..(from + BLOCK + 1).min(samples.len())];
@@ -150,19 +152,21 @@ fn runs(samples: &[f64]) -> Vec<Range<usize>> {
 }
 
 /// Least and greatest value; infinite the wrong way round where there is none.
-pub(crate) fn least_and_greatest(samples: &[f64]) -> (f64, f64) {
+pub(crate) fn least_and_greatest<S: Sample>(samples: &[S]) -> (f64, f64) {
     // Eight by eight, without a branch.
     let (eights, rest) = samples.as_chunks::<8>();
     let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
     for eight in eights {
         for k in 0..8 {
-            low[k] = if eight[k] < low[k] { eight[k] } else { low[k] };
-            high[k] = if eight[k] > high[k] { eight[k] } else { high[k] };
+            let value = eight[k].value();
+            low[k] = if value < low[k] { value } else { low[k] };
+            high[k] = if value > high[k] { value } else { high[k] };
         }
     }
+    let rest = || rest.iter().map(|v| v.value());
     (
-        low.iter().chain(rest).copied().fold(f64::INFINITY, f64::min),
-        high.iter().chain(rest).copied().fold(f64::NEG_INFINITY, f64::max),
+        low.into_iter().chain(rest()).fold(f64::INFINITY, f64::min),
+        high.into_iter().chain(rest()).fold(f64::NEG_INFINITY, f64::max),
     )
 }
 
@@ -176,12 +180,12 @@ const STRETCHES_AT_MOST: usize = 50;
 
 /// Signals of few digits repeat values by nature: nothing can be said about plateaus and rests there. A long stretch
 /// speaks for that only where its value is seen elsewhere too, as the zeros of coarse quiet air are.
-fn repeats_by_nature(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, f64)) -> bool {
+fn repeats_by_nature<S: Sample>(samples: &[S], runs: &[Range<usize>], (low, high): (f64, f64)) -> bool {
     let (mut repeats, mut stretches) = (0, Vec::new());
     for run in runs {
         if run.len() >= STUCK {
             stretches.push(run.clone());
-        } else if samples[run.start] != low && samples[run.start] != high {
+        } else if ![low, high].contains(&samples[run.start].value()) {
             repeats += run.len() - 1;
         }
     }
@@ -190,7 +194,7 @@ fn repeats_by_nature(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, 
         500 * (same - run.len()) < samples.len()
     };
     let few = stretches.len() <= STRETCHES_AT_MOST;
-    let extreme = |run: &Range<usize>| samples[run.start] == low || samples[run.start] == high;
+    let extreme = |run: &Range<usize>| [low, high].contains(&samples[run.start].value());
     let longest = stretches.iter().map(Range::len).max();
     let natural = stretches
         .iter()
@@ -201,7 +205,7 @@ fn repeats_by_nature(samples: &[f64], runs: &[Range<usize>], (low, high): (f64, 
 }
 
 /// Least and greatest value; `spikes` do not count.
-fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
+fn extremes<S: Sample>(samples: &[S], spikes: &[Range<usize>]) -> (f64, f64) {
     let starts = std::iter::once(0).chain(spikes.iter().map(|s| s.end));
     let ends = spikes.iter().map(|s| s.start).chain([samples.len()]);
     let sound = starts
@@ -217,24 +221,24 @@ fn extremes(samples: &[f64], spikes: &[Range<usize>]) -> (f64, f64) {
 const PILED_UP: usize = 4;
 
 /// True where samples stand at `level` because the signal rests there, with the values next to it in its steps as frequent.
-fn is_rest(samples: &[f64], level: f64) -> bool {
-    let next = samples
-        .iter()
-        .filter(|v| **v != level)
+fn is_rest<S: Sample>(samples: &[S], level: f64) -> bool {
+    let values = || samples.iter().map(|v| v.value());
+    let next = values()
+        .filter(|v| *v != level)
         .fold(f64::INFINITY, |least: f64, v| {
             if (v - level).abs() < (least - level).abs() {
-                *v
+                v
             } else {
                 least
             }
         });
-    let count = |value: f64| samples.iter().filter(|v| **v == value).count();
+    let count = |value: f64| values().filter(|v| *v == value).count();
     PILED_UP * count(next) > count(level)
 }
 
 /// At least two plateaus at one of the extreme values.
-fn clipping(
-    samples: &[f64],
+fn clipping<S: Sample>(
+    samples: &[S],
     runs: &[Range<usize>],
     (low, high): (f64, f64),
     at_rest: &[f64],
@@ -242,7 +246,7 @@ fn clipping(
     [high, low].into_iter().find_map(|level| {
         let plateaus: Vec<Range<usize>> = runs
             .iter()
-            .filter(|run| run.len() >= PLATEAU && samples[run.start] == level)
+            .filter(|run| run.len() >= PLATEAU && samples[run.start].value() == level)
             .cloned()
             .collect();
         // A single long one is a stuck channel rather than a peak cut off.
@@ -262,12 +266,12 @@ const RINGING: f64 = 0.2;
 
 /// Samples that stand far above (or below) those three before and three after. A step has no height in that sense, and
 /// what comes back once a revolution is the signal's own.
-fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
+fn spikes<S: Sample>(samples: &[S]) -> Vec<Range<usize>> {
     let n = samples.len();
     if n < 200 {
         return Vec::new();
     }
-    let height = |i: usize| height(samples[i - WIDEST_SPIKE], samples[i], samples[i + WIDEST_SPIKE]);
+    let height = |i: usize| height([i - WIDEST_SPIKE, i, i + WIDEST_SPIKE].map(|at| samples[at].value()));
     let within = WIDEST_SPIKE..n - WIDEST_SPIKE;
     let rank = (within.len() as f64 * 0.995) as usize;
     if none_stands_out(samples, within.len() - rank) {
@@ -304,7 +308,7 @@ fn spikes(samples: &[f64]) -> Vec<Range<usize>> {
 
 /// How far a sample stands above (or below) the one before and the one after it.
 #[inline]
-fn height(before: f64, here: f64, after: f64) -> f64 {
+fn height([before, here, after]: [f64; 3]) -> f64 {
     let (rise, fall) = (here - before, here - after);
     let least = if rise.abs() < fall.abs() {
         rise.abs()
@@ -316,7 +320,7 @@ fn height(before: f64, here: f64, after: f64) -> f64 {
 
 /// True where `upper` samples or more are at least a [`SPIKE`]th as high as the highest: then so is the usual height, and none
 /// can be [`SPIKE`] times that. Sound records are known by it without their heights being kept and sorted.
-fn none_stands_out(samples: &[f64], upper: usize) -> bool {
+fn none_stands_out<S: Sample>(samples: &[S], upper: usize) -> bool {
     let blocks = || {
         let before = samples.chunks(BLOCK);
         let here = samples[WIDEST_SPIKE..].chunks(BLOCK);
@@ -324,7 +328,7 @@ fn none_stands_out(samples: &[f64], upper: usize) -> bool {
         before.zip(here).zip(after).map(|((before, here), after)| {
             let mut heights = [0.0; BLOCK];
             for (((h, b), c), a) in heights.iter_mut().zip(before).zip(here).zip(after) {
-                *h = height(*b, *c, *a);
+                *h = height([b.value(), c.value(), a.value()]);
             }
             heights
         })
@@ -416,7 +420,7 @@ mod tests {
             faults(|v| v.iter_mut().for_each(|v| *v = (*v / 20.0).round())),
             Faults::default()
         );
-        assert_eq!(find_faults(&[]), Faults::default());
+        assert_eq!(find_faults::<f64>(&[]), Faults::default());
         assert_eq!(find_faults(&[1.0]), Faults::default());
         // A tooth that rings once a revolution is no fault.
         assert_eq!(

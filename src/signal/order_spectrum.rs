@@ -14,6 +14,7 @@ use pulp::{Arch, Simd, WithSimd};
 use realfft::RealFftPlanner;
 
 use super::blocks::median;
+use crate::data::Sample;
 
 /// One channel over a steady window.
 #[derive(Debug, Clone)]
@@ -51,8 +52,8 @@ const PIECE_REVOLUTIONS: f64 = 16.0;
 /// `samples`: the steady window, its baseline taken off; `samples_per_revolution` is not a whole number in general and
 /// the last revolution may end within a sample. `None` where there are less than two revolutions,
 /// which tell no scatter.
-pub fn order_spectrum(
-    samples: &[f64],
+pub fn order_spectrum<S: Sample>(
+    samples: &[S],
     sample_rate_hz: f64,
     samples_per_revolution: f64,
     orders: usize,
@@ -61,8 +62,8 @@ pub fn order_spectrum(
 }
 
 /// The same of samples that `zero` (of a sample's index) is still to be taken off.
-pub fn order_spectrum_above(
-    samples: &[f64],
+pub fn order_spectrum_above<S: Sample>(
+    samples: &[S],
     zero: impl Fn(usize) -> f64,
     sample_rate_hz: f64,
     samples_per_revolution: f64,
@@ -78,8 +79,8 @@ pub fn order_spectrum_above(
     )
 }
 
-fn spectrum_by_pieces(
-    samples: &[f64],
+fn spectrum_by_pieces<S: Sample>(
+    samples: &[S],
     zero: impl Fn(usize) -> f64,
     sample_rate_hz: f64,
     samples_per_revolution: f64,
@@ -94,7 +95,7 @@ fn spectrum_by_pieces(
     let count = (length.ceil() as usize).min(samples.len());
     // The last sample counts as far as the revolution reaches into it.
     let last = (length - (count as f64 - 1.0)).clamp(0.0, 1.0);
-    let above_zero = |i: usize| samples[i] - zero(i);
+    let above_zero = |i: usize| samples[i].value() - zero(i);
     let trend = Trend::new(above_zero, count, revolutions as usize, samples_per_revolution);
     // Pieces of whole revolutions, to the sample; what is left over at the end has no lines of its own.
     let per_piece = (longest as f64 / samples_per_revolution)
@@ -372,8 +373,8 @@ impl Trend {
 }
 
 /// Mean of `samples` between two positions that need not be whole: a sample counts by the share of it that lies inside.
-pub fn mean_between(samples: &[f64], from: f64, to: f64) -> f64 {
-    mean_of(&|i| samples[i], samples.len(), from, to)
+pub fn mean_between<S: Sample>(samples: &[S], from: f64, to: f64) -> f64 {
+    mean_of(&|i| samples[i].value(), samples.len(), from, to)
 }
 
 /// The same of `count` samples that `value` makes.
@@ -392,13 +393,13 @@ fn mean_of(value: &impl Fn(usize) -> f64, count: usize, from: f64, to: f64) -> f
 }
 
 /// Amplitude of a line at `hz` in `samples`, less what noise alone would show; a straight line is taken out first.
-pub fn line_amplitude(samples: &[f64], sample_rate_hz: f64, hz: f64) -> f64 {
+pub fn line_amplitude<S: Sample>(samples: &[S], sample_rate_hz: f64, hz: f64) -> f64 {
     let n = samples.len();
     if n < 16 {
         return 0.0;
     }
     let index = || (0..n).map(|i| i as f64);
-    let (mean, slope, centre) = super::blocks::line(index(), samples.iter().copied());
+    let (mean, slope, centre) = super::blocks::line(index(), samples.iter().map(|v| v.value()));
     let (window_turn, line_turn) = (Turn::new(n as f64), Turn::new(sample_rate_hz / hz));
     let half_a_sample = Complex64::from_polar(1.0, -TAU * 0.5 / n as f64);
     let (mut sum, mut window, mut square) = (Complex64::ZERO, 0.0, 0.0);
@@ -408,7 +409,7 @@ pub fn line_amplitude(samples: &[f64], sample_rate_hz: f64, hz: f64) -> f64 {
         for (k, v) in samples.iter().enumerate() {
             let cosine = hann[0][k] * half_a_sample.re - hann[1][k] * half_a_sample.im;
             let hann = 0.5 - 0.5 * cosine;
-            let value = v - mean - slope * ((first + k) as f64 - centre);
+            let value = v.value() - mean - slope * ((first + k) as f64 - centre);
             sum += Complex64::new(line[0][k], line[1][k]) * (hann * value);
             window += hann;
             square += value * value;
@@ -526,7 +527,7 @@ mod tests {
     #[test]
     fn fractional_means_and_hum() {
         assert!((mean_between(&[1.0, 2.0, 3.0], 0.5, 2.5) - 2.0).abs() < 1e-12);
-        assert_eq!(mean_between(&[], 0.0, 1.0), 0.0);
+        assert_eq!(mean_between::<f64>(&[], 0.0, 1.0), 0.0);
         let hum: Vec<f64> = (0..2000)
             .map(|i| 3.0 * (TAU * 50.0 * i as f64 / 5000.0 + 0.4).cos())
             .collect();

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::blocks::mean;
+use crate::data::Sample;
 
 /// The angle of the spindle over a steady cut.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,8 +60,8 @@ const SIGMAS: f64 = 5.0;
 
 /// Follows the spindle over `window` of `channels` (baselines need not be taken off). `None` where nothing can be
 /// found wrong: too few turns, no line that is in step, or one that keeps the stated speed as closely as matters.
-pub fn spindle_track(
-    channels: &[&[f64]],
+pub fn spindle_track<S: Sample>(
+    channels: &[&[S]],
     window: &Range<usize>,
     samples_per_turn: f64,
     teeth: usize,
@@ -75,7 +76,7 @@ pub fn spindle_track(
         orders.push(1);
     }
     let length = (turns as f64 * samples_per_turn).ceil() as usize;
-    let own: Vec<&[f64]> = channels
+    let own: Vec<&[S]> = channels
         .iter()
         .map(|values| {
             let end = (window.start + length).min(values.len());
@@ -103,7 +104,7 @@ struct Start {
 }
 
 /// The phase of a line in `windows`, one a channel.
-fn follow(windows: &[&[f64]], start: Start, order: usize) -> Option<SpindleTrack> {
+fn follow<S: Sample>(windows: &[&[S]], start: Start, order: usize) -> Option<SpindleTrack> {
     let Start {
         from,
         samples_per_turn,
@@ -182,7 +183,7 @@ fn follow(windows: &[&[f64]], start: Start, order: usize) -> Option<SpindleTrack
 
 /// Mean of x e^(−i n θ) over turn `k` of the stated speed, the turn's mean taken out. (A slope taken out, too, would take some of
 /// every line with it.)
-fn line_of_turn(values: &[f64], k: usize, samples_per_turn: f64, order: usize) -> Complex64 {
+fn line_of_turn<S: Sample>(values: &[S], k: usize, samples_per_turn: f64, order: usize) -> Complex64 {
     let start = k as f64 * samples_per_turn;
     let (first, last) = (
         start.round() as usize,
@@ -194,7 +195,7 @@ fn line_of_turn(values: &[f64], k: usize, samples_per_turn: f64, order: usize) -
     let each = own
         .iter()
         .enumerate()
-        .map(|(i, v)| Complex64::from_polar(v - level, -step * (first + i) as f64));
+        .map(|(i, v)| Complex64::from_polar(v.value() - level, -step * (first + i) as f64));
     each.sum::<Complex64>() / own.len().max(1) as f64
 }
 
@@ -427,21 +428,25 @@ impl SpindleTrack {
     }
 
     /// `values` as they would have been sampled in step with a spindle of the stated speed; as long as before.
-    pub fn in_step_samples(&self, values: &[f64]) -> Vec<f64> {
+    pub fn in_step_samples<S: Sample>(&self, values: &[S]) -> Vec<S> {
         self.resampled(values, 0..values.len())
     }
 
     /// Samples `range` of that: cubic interpolation between samples (Keys 1981), ends repeated.
-    fn resampled(&self, values: &[f64], range: Range<usize>) -> Vec<f64> {
+    fn resampled<S: Sample>(&self, values: &[S], range: Range<usize>) -> Vec<S> {
         let last = values.len().saturating_sub(1) as isize;
-        let value = |i: isize| values.get(i.clamp(0, last) as usize).copied().unwrap_or(0.0);
+        let value = |i: isize| values.get(i.clamp(0, last) as usize).map_or(0.0, |v| v.value());
         range
             .map(|i| {
                 let at = self.sample_in_step(i as f64);
                 let low = at.floor();
                 let (t, i) = (at - low, low as isize);
                 let [a, b, c, d] = [value(i - 1), value(i), value(i + 1), value(i + 2)];
-                b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+                S::of(
+                    b + 0.5
+                        * t
+                        * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a))),
+                )
             })
             .collect()
     }

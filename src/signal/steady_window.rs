@@ -12,6 +12,7 @@ use super::blocks::{SignalBlocks, line, median, robust_std};
 use super::drift::Air;
 use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
+use crate::data::Sample;
 use crate::statistics::quantile;
 
 /// What turns, and how the record is sampled.
@@ -41,7 +42,11 @@ const ALIKE: f64 = 0.15;
 /// Finds the phases of a record from its channels (all of one length; those that carry the cutting force).
 /// `entry_samples`: travel from first contact to full engagement where geometry tells it (drilling);
 /// otherwise entry is detected. `None` where the record holds less than a revolution, or no steady cut.
-pub fn find_phases(channels: &[&[f64]], spindle: Spindle, entry_samples: Option<f64>) -> Option<Phases> {
+pub fn find_phases<S: Sample>(
+    channels: &[&[S]],
+    spindle: Spindle,
+    entry_samples: Option<f64>,
+) -> Option<Phases> {
     let samples = channels.iter().map(|c| c.len()).min()?;
     let per_block = block_length(samples, spindle)?;
     let blocks: Vec<SignalBlocks> = channels
@@ -364,7 +369,7 @@ mod tests {
             samples_per_revolution: 100.0,
             teeth: 2,
         };
-        assert_eq!(find_phases(&[], spindle, None), None);
+        assert_eq!(find_phases::<f64>(&[], spindle, None), None);
         assert_eq!(find_phases(&[&[1.0; 90]], spindle, None), None);
         // A clip out of a cut is all cut, however short.
         let clip = find_phases(&[&[1.0; 250]], spindle, None).unwrap();

@@ -6,6 +6,7 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 use super::blocks::median;
 use super::mains::MAINS_HZ;
+use crate::data::Sample;
 
 /// What the spectrum of a steady cut says about the spindle speed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -42,8 +43,8 @@ const PLACED: f64 = 0.5;
 /// Looks for lines in the Hann-windowed amplitude spectra of the `channels` of one steady cut, all together (drift compensated, or
 /// not: a line is taken out). All together, because one direction may show twice the tooth passing more strongly than itself.
 /// `None` where the record is shorter than 8 revolutions, or has no spectrum.
-pub fn tooth_line(
-    channels: &[&[f64]],
+pub fn tooth_line<S: Sample>(
+    channels: &[&[S]],
     sample_rate_hz: f64,
     spindle_hz: f64,
     teeth: usize,
@@ -129,16 +130,16 @@ pub fn tooth_line(
 }
 
 /// Adds |X|² of a channel, a line taken out of it, to that of the others.
-fn add_power(samples: &[f64], transform: &dyn RealToComplex<f64>, power: &mut [f64]) {
+fn add_power<S: Sample>(samples: &[S], transform: &dyn RealToComplex<f64>, power: &mut [f64]) {
     let n = samples.len();
     let index = || (0..n).map(|i| i as f64);
-    let (mean, slope, centre) = super::blocks::line(index(), samples.iter().copied());
+    let (mean, slope, centre) = super::blocks::line(index(), samples.iter().map(|v| v.value()));
     let mut input: Vec<f64> = samples
         .iter()
         .enumerate()
         .map(|(i, v)| {
             let hann = 0.5 - 0.5 * (TAU * i as f64 / n as f64).cos();
-            hann * (v - mean - slope * (i as f64 - centre))
+            hann * (v.value() - mean - slope * (i as f64 - centre))
         })
         .collect();
     let mut spectrum = transform.make_output_vec();

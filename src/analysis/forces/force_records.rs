@@ -11,9 +11,9 @@ use crate::cutting::{
     CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, analyse_in_step,
     fit_force_coefficients, none_usable, repair_record,
 };
-use crate::data::Cut;
+use crate::data::{Cut, Sample};
 use crate::identify::forces::cutting_data::CutData;
-use crate::ingest::{self, ChannelRole, Digest, TimeRecord};
+use crate::ingest::{self, Digest, ForceFile, TimeFile, TimeRecord};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
 
@@ -39,36 +39,45 @@ pub fn cutting_trials(campaign: &Campaign) -> Result<CuttingTrials<'_>> {
 }
 
 /// The record of one cut, bad samples replaced, and what its owner should know.
-struct ReadRecord {
-    record: TimeRecord,
+struct ReadRecord<S = f64> {
+    record: TimeRecord<S>,
     notices: Vec<Notice>,
     digest: Digest,
 }
 
-impl ReadRecord {
-    fn of(campaign: &Campaign, cut: usize) -> Result<Self> {
-        let cut = &campaign.cuts[cut];
-        let file = ingest::read_time_with(&cut.file, &campaign.channel_rules(&cut.id))?;
+impl<S: Sample> ReadRecord<S> {
+    fn of(file: TimeFile<S>, campaign: &Campaign, cut: usize) -> Self {
         let mut record = file.record;
-        // Accelerations and the like were recorded with the forces; long records need their memory.
-        if record.channels.iter().any(|c| c.role != ChannelRole::Other) {
-            record.channels.retain(|c| c.role != ChannelRole::Other);
-        }
-        let mut notices = repair_record(&mut record, cut.spindle_rpm);
+        let mut notices = repair_record(&mut record, campaign.cuts[cut].spindle_rpm);
         let noticed = |detail| Notice { kind: READER, detail };
         notices.extend(file.warnings.into_iter().map(noticed));
-        Ok(ReadRecord {
+        ReadRecord {
             record,
             notices,
             digest: file.digest,
-        })
+        }
     }
 
     /// What it says, in step with the stated speed.
-    fn reading(self, campaign: &Campaign, cut: usize) -> Result<RecordReading> {
+    fn reading(self, campaign: &Campaign, cut: usize) -> Result<RecordReading<S>> {
         analyse_in_step(&cutting_trials(campaign)?, cut, self.record, self.notices)
     }
+
+    /// Averages and waveform of a cut.
+    fn told(self, campaign: &Campaign, cut: usize) -> Told {
+        let digest = Some(self.digest);
+        match self.reading(campaign, cut) {
+            Ok(reading) => {
+                let waveform = waveform(campaign, cut, &reading);
+                (Ok(reading.averages), waveform, digest)
+            }
+            Err(error) => (Err(error.clone()), Err(error), digest),
+        }
+    }
 }
+
+/// Averages and waveform of a cut, and what identifies the file.
+type Told = (Result<CutAnalysis>, Result<Waveform>, Option<Digest>);
 
 /// A cut's forces as `compare` and `diagnose` look at them, and what their owner should know.
 pub type Waveform = (CutData, Vec<Notice>);
@@ -94,21 +103,18 @@ impl ForceRecords {
         let plain: &Campaign = campaign;
         let progress = Progress::new("force records", plain.cuts.len());
         let one = |cut: usize| {
-            let read = ReadRecord::of(plain, cut);
-            let digest = read.as_ref().ok().map(|read| read.digest);
-            let reading = read.and_then(|read| read.reading(plain, cut));
+            let own = &plain.cuts[cut];
+            let told = match ingest::read_forces_with(&own.file, &plain.channel_rules(&own.id)) {
+                Ok(ForceFile::Short(file)) => ReadRecord::of(file, plain, cut).told(plain, cut),
+                Ok(ForceFile::Long(file)) => ReadRecord::of(file, plain, cut).told(plain, cut),
+                Err(error) => (Err(error.clone()), Err(error), None),
+            };
             progress.step();
-            match reading {
-                Ok(reading) => {
-                    let waveform = waveform(plain, cut, &reading);
-                    (Ok(reading.averages), waveform, digest)
-                }
-                Err(error) => (Err(error.clone()), Err(error), digest),
-            }
+            told
         };
         let bytes = |cut: &Cut| std::fs::metadata(&cut.file).map_or(0, |m| m.len());
         let sizes: Vec<u64> = plain.cuts.iter().map(bytes).collect();
-        let mut read: Vec<(Result<CutAnalysis>, Result<Waveform>, Option<Digest>)> = Vec::new();
+        let mut read: Vec<Told> = Vec::new();
         for batch in batches(&sizes) {
             read.par_extend(batch.into_par_iter().map(one));
         }
@@ -145,7 +151,7 @@ fn batches(sizes: &[u64]) -> Vec<Range<usize>> {
     batches
 }
 
-fn waveform(campaign: &Campaign, cut: usize, reading: &RecordReading) -> Result<Waveform> {
+fn waveform<S: Sample>(campaign: &Campaign, cut: usize, reading: &RecordReading<S>) -> Result<Waveform> {
     let tool = cutting_trials(campaign)?.tool;
     let (record, analysis) = (&reading.waveform_record, &reading.waveform);
     let data = CutData::new(tool, (cut, &campaign.cuts[cut]), record, analysis)?;
@@ -201,6 +207,14 @@ mod tests {
             .fold(0.0, f64::max)
     }
 
+    fn read_record(campaign: &Campaign, cut: usize) -> Result<ReadRecord> {
+        let own = &campaign.cuts[cut];
+        match ingest::read_forces_with(&own.file, &campaign.channel_rules(&own.id))? {
+            ForceFile::Short(file) => Ok(ReadRecord::of(file, campaign, cut)),
+            ForceFile::Long(_) => panic!("{} is short", own.id),
+        }
+    }
+
     #[test]
     fn few_long_records_are_in_memory_at_once() {
         let mb = |sizes: &[u64]| batches(&sizes.iter().map(|mb| mb << 20).collect::<Vec<u64>>());
@@ -228,7 +242,7 @@ mod tests {
                 .into();
             let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
             let before = (0..cuts.len()).map(|i| {
-                let read = ReadRecord::of(&campaign, i)?;
+                let read = read_record(&campaign, i)?;
                 analyse_cut(&cutting_trials(&campaign)?, i, &read.record)
             });
             let trials = cutting_trials(&campaign).unwrap();
@@ -309,11 +323,8 @@ mod tests {
             size * (angle + axis as f64).cos()
         });
         for i in 0..cuts.len() {
-            let as_read = ReadRecord::of(&campaign, i).unwrap().record;
-            let reading = ReadRecord::of(&campaign, i)
-                .unwrap()
-                .reading(&campaign, i)
-                .unwrap();
+            let as_read = read_record(&campaign, i).unwrap().record;
+            let reading = read_record(&campaign, i).unwrap().reading(&campaign, i).unwrap();
             assert_eq!(reading.averages.spindle, None, "cut {i}");
             let samples = |record: &TimeRecord| record.channels[0].samples.clone();
             assert_eq!(samples(&reading.waveform_record), samples(&as_read));
@@ -335,11 +346,8 @@ mod tests {
                 speed,
             };
             let campaign = write_campaign(dir.path(), &[cut], &|_, _, _, _, _| 0.0);
-            let as_read = ReadRecord::of(&campaign, 0).unwrap().record;
-            let reading = ReadRecord::of(&campaign, 0)
-                .unwrap()
-                .reading(&campaign, 0)
-                .unwrap();
+            let as_read = read_record(&campaign, 0).unwrap().record;
+            let reading = read_record(&campaign, 0).unwrap().reading(&campaign, 0).unwrap();
             assert!(reading.waveform.spindle.is_some(), "{wanders}");
             let untouched = reading.waveform_record.channels[0].samples == as_read.channels[0].samples;
             assert_eq!(untouched, wanders);
@@ -354,10 +362,7 @@ mod tests {
                 .join(name);
             let campaign = Campaign::load(&dir).unwrap();
             for i in 0..campaign.cuts.len() {
-                let reading = ReadRecord::of(&campaign, i)
-                    .unwrap()
-                    .reading(&campaign, i)
-                    .unwrap();
+                let reading = read_record(&campaign, i).unwrap().reading(&campaign, i).unwrap();
                 assert_eq!(reading.averages.spindle, None, "{name}, cut {i}");
             }
         }

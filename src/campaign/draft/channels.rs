@@ -1,4 +1,4 @@
-//! `[[channel]]` sections for force files whose columns have no names.
+//! `[[channel]]` sections for force files whose columns have no names, or names that say nothing.
 
 use super::answers::Answers;
 use super::entry::{DraftTable, Entry, Kind};
@@ -10,14 +10,17 @@ use crate::ingest::{NamedForce, PlainColumn, taken_for};
 /// A section for the time, where there is one, and for each signal, taken as x, y, z and torque in their order.
 pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
-    let has_time = columns.first().is_some_and(|c| c.step.is_some());
-    for (i, (column, name)) in taken_for(columns).enumerate() {
+    let has_time = columns.first().is_some_and(PlainColumn::is_clock);
+    for (place, column, name) in taken_for(columns) {
         let mut making = Making::new(answers, "channel", name, true);
         making.fact("name", Kind::Text, name);
-        let at = (i + 1).to_string();
+        let at = place.to_string();
         let shows = column.describe();
-        if column.step.is_some() {
-            making.fact("column", Kind::Whole, &at);
+        if column.is_clock() {
+            match &column.name {
+                Some(own) => making.fact("in_file", Kind::Text, own),
+                None => making.fact("column", Kind::Whole, &at),
+            }
             let unit = Entry::new(
                 "unit",
                 Kind::Choice(&["s", "ms"]),
@@ -26,7 +29,16 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
             );
             making.add(unit, &[(Some("s"), format!("the column {shows}").as_str())])?;
         } else {
-            let place = Entry::new("column", Kind::Whole, "which column it is, from 1", "1");
+            let (place, at) = match &column.name {
+                Some(own) => (
+                    Entry::new("in_file", Kind::Text, "how the file calls it", "Ch1"),
+                    own,
+                ),
+                None => (
+                    Entry::new("column", Kind::Whole, "which column it is, from 1", "1"),
+                    &at,
+                ),
+            };
             let why = format!(
                 "signals taken as fx, fy, fz, mz in their order; this one: {shows}{}",
                 column.how_far()

@@ -10,9 +10,11 @@ use super::cut_list;
 use super::found::{FoundForce, FoundFrf, Scan, stem};
 use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
-use crate::data::{ChannelRole, Quantity, RobotSpec};
+use crate::data::{Channel, ChannelRole, Quantity, RobotSpec, TimeRecord};
 use crate::ingest::{
-    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, plain_columns, sheet_text, survey, timeless,
+    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, is_called_acceleration, is_called_marker,
+    plain_columns, sheet_text, survey, timeless,
+    units::{self, Dimension},
 };
 use crate::progress::Progress;
 use crate::stop;
@@ -253,14 +255,14 @@ fn look(name: String, file: &Path) -> Seen {
                 Some(remedy) => format!("{} ({remedy})", error.problem),
                 None => error.problem.clone(),
             };
-            return match plain_columns(file) {
-                Ok(Some(columns)) if may_be_forces(&columns) => {
-                    Seen::Nameless(force_of(name, file), columns, why)
+            return match timeless(file).unwrap_or_default() {
+                Timeless { cuts, .. } if cuts.len() > 1 => several(&force_of(name, file), cuts),
+                Timeless { forces, .. } if !forces.is_empty() => {
+                    Seen::Timeless(force_of(name, file), forces, why)
                 }
-                _ => match timeless(file).unwrap_or_default() {
-                    Timeless { cuts, .. } if cuts.len() > 1 => several(&force_of(name, file), cuts),
-                    Timeless { forces, .. } if !forces.is_empty() => {
-                        Seen::Timeless(force_of(name, file), forces, why)
+                _ => match plain_columns(file) {
+                    Ok(Some(columns)) if may_be_forces(&columns) => {
+                        Seen::Nameless(force_of(name, file), columns, why)
                     }
                     _ => Seen::NotUsed(name, why),
                 },
@@ -297,11 +299,26 @@ fn look(name: String, file: &Path) -> Seen {
     }
     let why = match contents.times.is_empty() {
         true => format!("holds {}", contents.describe()),
-        false => {
-            "a time record without cutting forces (a tap test? `lobestone modal` makes FRFs of it)".into()
-        }
+        false => without_forces(&contents.times),
     };
     Seen::NotUsed(name, why)
+}
+
+/// A time record whose channels are called otherwise than forces: what it may be, and what to do then.
+fn without_forces(times: &[TimeRecord]) -> String {
+    let is_current =
+        |c: &&Channel| units::parse(&c.file_unit).is_some_and(|u| u.dimension == Dimension::CURRENT);
+    let mut channels = times.iter().flat_map(|t| &t.channels);
+    match channels.find(is_current) {
+        Some(current) => format!(
+            "a time record of motor currents, no forces; where you know what force an ampere stands for, write in campaign.toml such as \
+             [[channel]] name = \"fz\", in_file = {:?}, gain = \"350 N/A\"",
+            current.name
+        ),
+        None => "a time record without cutting forces (a tap test? `lobestone modal` makes FRFs of it; forces under other names? say \
+                 which in a [[channel]] of campaign.toml)"
+            .into(),
+    }
 }
 
 /// The cuts of a file that holds more than one.
@@ -331,14 +348,25 @@ const ROWS_OF_A_RECORD: usize = 500;
 /// Signals of one record: forces, and what else was recorded with them.
 const MOST_SIGNALS: usize = 12;
 
-/// Two signals or more, with a time column before them or none; what rises without being a clock is something else.
+/// Two signals or more, or one beside its times; with a time column before them, one that counts the rows, or none. What rises
+/// without being a clock is something else, and so is what is called otherwise than a force.
 fn may_be_forces(columns: &[PlainColumn]) -> bool {
-    let signals = match columns {
-        [time, signals @ ..] if time.step.is_some_and(|step| step <= SLOWEST_STEP) => signals,
-        all => all,
+    let is_time = |c: &PlainColumn| c.counts() || c.step.is_some_and(|step| step <= SLOWEST_STEP);
+    let (has_time, signals) = match columns {
+        [time, signals @ ..] if is_time(time) => (true, signals),
+        all => (false, all),
     };
-    let is_record = signals.len() <= SIGNALS.len() || signals.iter().all(|c| c.rows >= ROWS_OF_A_RECORD);
-    (2..=MOST_SIGNALS).contains(&signals.len()) && is_record && signals.iter().all(|c| !c.rises)
+    let is_long = signals.iter().all(|c| c.rows >= ROWS_OF_A_RECORD);
+    let is_named = signals.iter().any(|c| c.name.is_some());
+    let least = if has_time && is_long { 1 } else { 2 };
+    let is_record = is_long || signals.len() <= SIGNALS.len() && !is_named;
+    let is_other = |c: &PlainColumn| {
+        let is_called_so = |name: &str| is_called_acceleration(name) || is_called_marker(name);
+        c.name.as_deref().is_some_and(is_called_so)
+    };
+    (least..=MOST_SIGNALS).contains(&signals.len())
+        && is_record
+        && signals.iter().all(|c| !c.rises && !is_other(c))
 }
 
 /// A file, what its channels are and how they are called, and why it was not understood.
@@ -361,7 +389,10 @@ fn take_timeless(scan: &mut Scan, timeless: Vec<TimelessForce>) {
 /// Tables without names are the folder's force records where no file has names and all have the same columns: what these are
 /// is asked once.
 fn take_nameless(scan: &mut Scan, nameless: Vec<(FoundForce, Vec<PlainColumn>, String)>) {
-    let layout = |columns: &[PlainColumn]| (columns.len(), columns.first().is_some_and(|c| c.step.is_some()));
+    let layout = |columns: &[PlainColumn]| {
+        let names: Vec<Option<String>> = columns.iter().map(|c| c.name.clone()).collect();
+        (names, columns.first().is_some_and(|c| c.step.is_some()))
+    };
     let alike = nameless
         .iter()
         .all(|(_, columns, _)| layout(columns) == layout(&nameless[0].1));

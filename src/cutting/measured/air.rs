@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::cut_analysis::{ChannelAnalysis, Notice};
-use crate::data::Process;
+use crate::data::{Process, Sample};
 use crate::signal::{self, Air, DriftLine, fit_drift};
 use crate::text::figures;
 
@@ -41,8 +41,8 @@ const STEEP_SIGMA: f64 = 6.0;
 /// `air` without the stretches that run too steeply for an amplifier's drift. `channels`: samples of those that carry the force.
 /// And whether what is left is too short for its slope to be believed.
 #[allow(clippy::too_many_arguments)]
-pub(crate) fn believable_air(
-    channels: &[(ForceAxis, &[f64])],
+pub(crate) fn believable_air<S: Sample>(
+    channels: &[(ForceAxis, &[S])],
     rate: f64,
     start_s: f64,
     air: &Air,
@@ -53,8 +53,8 @@ pub(crate) fn believable_air(
 ) -> (Air, bool) {
     let time = |i: usize| start_s + i as f64 / rate;
     let middle = 0.5 * (time(steady.start) + time(steady.end));
-    let mean = |values: &[f64], r: &Range<usize>| signal::mean(values.get(r.clone()).unwrap_or(&[]));
-    let own = |values: &[f64], before: Option<&Range<usize>>, after: Option<&Range<usize>>| {
+    let mean = |values: &[S], r: &Range<usize>| signal::mean(values.get(r.clone()).unwrap_or(&[]));
+    let own = |values: &[S], before: Option<&Range<usize>>, after: Option<&Range<usize>>| {
         let side = Air {
             before: before.cloned(),
             after: after.cloned(),
@@ -64,7 +64,7 @@ pub(crate) fn believable_air(
     let (before, after) = (air.before.as_ref(), air.after.as_ref());
     let (mut told, mut short) = (Vec::new(), false);
     let mut is_sound = |range: &Range<usize>, is_before: bool, other: Option<&Range<usize>>| -> bool {
-        let line = |values: &[f64]| match is_before {
+        let line = |values: &[S]| match is_before {
             true => own(values, Some(range), None),
             false => own(values, None, Some(range)),
         };
@@ -82,10 +82,10 @@ pub(crate) fn believable_air(
         // Force above the level of this air and its ripple, largest of its kind.
         let size = |torque: bool| {
             let kind = channels.iter().filter(|c| (c.0 == ForceAxis::Mz) == torque);
-            let of = |c: &(ForceAxis, &[f64])| {
+            let of = |c: &(ForceAxis, &[S])| {
                 let (level, zero) = (mean(c.1, steady), mean(c.1, range));
                 let cutting = c.1.get(steady.clone()).unwrap_or(&[]);
-                let squares: f64 = cutting.iter().map(|v| (v - level).powi(2)).sum();
+                let squares: f64 = cutting.iter().map(|v| (v.value() - level).powi(2)).sum();
                 (level - zero).hypot((squares / cutting.len().max(1) as f64).sqrt())
             };
             kind.map(of).fold(0.0, f64::max)

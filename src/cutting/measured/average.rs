@@ -6,7 +6,7 @@ use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::cut_analysis::{
     Average, ChannelAnalysis, CutAnalysis, TurnAverage, in_tool_axes,
 };
-use crate::data::TimeRecord;
+use crate::data::{Sample, TimeRecord};
 use crate::signal::{self, DriftLine, SignalBlocks};
 
 /// Revolutions whose mean is further than this many robust standard deviations off are spikes.
@@ -19,15 +19,15 @@ const FEW_TURNS: usize = 8;
 const POOLED_FREEDOM: f64 = 8.0;
 
 /// Mean over the revolutions of the window with the baseline taken off.
-pub(crate) fn average(
-    values: &[f64],
+pub(crate) fn average<S: Sample>(
+    values: &[S],
     steady: &Range<usize>,
     samples_per_revolution: f64,
     drift: &DriftLine,
-    record: &TimeRecord,
+    record: &TimeRecord<S>,
 ) -> TurnAverage {
     let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
-    let compensated = |i: usize| values[steady.start + i] - drift.at(time(steady.start + i));
+    let compensated = |i: usize| values[steady.start + i].value() - drift.at(time(steady.start + i));
     let blocks = SignalBlocks::of(steady.len(), compensated, samples_per_revolution);
     let centre = signal::median(&blocks.mean);
     let deviation: Vec<f64> = blocks.mean.iter().map(|m| (m - centre).abs()).collect();
@@ -181,7 +181,7 @@ mod tests {
             .iter()
             .flat_map(|m| (0..10).map(move |i| m + ripple[i % 2]))
             .collect();
-        of(&values, &fit_drift(&[], 100.0, 0.0, &Air::default()))
+        of(&values, &fit_drift::<f64>(&[], 100.0, 0.0, &Air::default()))
     }
 
     fn of(values: &[f64], drift: &DriftLine) -> TurnAverage {
@@ -236,7 +236,7 @@ mod tests {
     /// The zero's own uncertainty counts at the middle of the window, and a zero that bends by 2 N is known to 2 N.
     #[test]
     fn the_zero_is_as_certain_as_at_the_middle_of_the_window() {
-        let mut drift = fit_drift(&[], 100.0, 0.0, &Air::default());
+        let mut drift = fit_drift::<f64>(&[], 100.0, 0.0, &Air::default());
         (drift.offset, drift.slope_per_s, drift.reference_s) = (4.0, 10.0, 1.0);
         (drift.slope_std_per_s, drift.bend) = (1.5, 2.0);
         // Four turns, 0.4 s; the zero rises from −6 N to −2 N.

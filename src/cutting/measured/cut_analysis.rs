@@ -154,7 +154,7 @@ pub(super) fn made_channel(axis: ForceAxis, average: Average) -> ChannelAnalysis
     ChannelAnalysis {
         name: String::new(),
         axis,
-        drift: fit_drift(&[], 100.0, 0.0, &Air::default()),
+        drift: fit_drift::<f64>(&[], 100.0, 0.0, &Air::default()),
         mean: TurnAverage {
             average,
             turns: 10,

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::cutting::force_model::force_axis::axis_of;
 use crate::cutting::measured::cut_analysis::Notice;
-use crate::data::{ChannelRole, TimeRecord};
+use crate::data::{ChannelRole, Sample, TimeRecord};
 use crate::signal::find_faults;
 use crate::text::figures;
 
@@ -21,7 +21,7 @@ const TURNS: usize = 50;
 
 /// Replaces spikes, stuck and dropped samples of the force channels by the same angle of the nearest good revolutions.
 /// (Clipped peaks are clipped in every revolution: nothing can stand in for them.)
-pub fn repair_record(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
+pub fn repair_record<S: Sample>(record: &mut TimeRecord<S>, spindle_rpm: f64) -> Vec<Notice> {
     let per_turn = record.sample_rate_hz * 60.0 / spindle_rpm;
     let (start_s, rate, filled) = (record.start_s, record.sample_rate_hz, record.filled.clone());
     let time = |r: &Range<usize>| start_s + r.start as f64 / rate;
@@ -45,14 +45,14 @@ pub fn repair_record(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
             format!(
                 "{} samples stuck at {} {unit} from {:.3} s",
                 r.len(),
-                figures(values[r.start], 4),
+                figures(values[r.start].value(), 4),
                 time(r)
             )
         });
         let spikes = told(&faults.spikes, &|r| {
             format!(
                 "spike to {} {unit} at {:.3} s",
-                figures(values[r.start], 4),
+                figures(values[r.start].value(), 4),
                 time(r)
             )
         });
@@ -81,17 +81,18 @@ pub fn repair_record(record: &mut TimeRecord, spindle_rpm: f64) -> Vec<Notice> {
 }
 
 /// Puts in the place of bad samples the mean of those one revolution before and after (or two, …, where these are bad too).
-fn substitute(values: &mut [f64], bad: &[bool], per_turn: f64) {
+fn substitute<S: Sample>(values: &mut [S], bad: &[bool], per_turn: f64) {
     // Only good samples are looked at, and those stay what they are.
-    let at = |values: &[f64], position: f64| -> Option<f64> {
+    let at = |values: &[S], position: f64| -> Option<f64> {
         let low = position.floor();
         if !(low >= 0.0 && low + 1.0 < values.len() as f64) {
             return None;
         }
         let (i, share) = (low as usize, position - low);
-        (!bad[i] && !bad[i + 1]).then(|| values[i] + share * (values[i + 1] - values[i]))
+        let [here, next] = [values[i].value(), values[i + 1].value()];
+        (!bad[i] && !bad[i + 1]).then_some(here + share * (next - here))
     };
-    let beside = |values: &[f64], i: usize| {
+    let beside = |values: &[S], i: usize| {
         (1..=TURNS).find_map(|k| {
             let away = k as f64 * per_turn;
             match (at(values, i as f64 - away), at(values, i as f64 + away)) {
@@ -103,9 +104,9 @@ fn substitute(values: &mut [f64], bad: &[bool], per_turn: f64) {
     let mut last_good = 0.0;
     for i in 0..values.len() {
         if bad[i] {
-            values[i] = beside(values, i).unwrap_or(last_good);
+            values[i] = S::of(beside(values, i).unwrap_or(last_good));
         } else {
-            last_good = values[i];
+            last_good = values[i].value();
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::cutting::cutting_trials::CuttingTrials;
 use crate::cutting::force_model::force_axis::{ForceAxis, axis_of};
 use crate::cutting::measured::cut_analysis::{CutAnalysis, Notice};
 use crate::cutting::measured::record::analyse_cut;
-use crate::data::{Process, TimeRecord, Tool};
+use crate::data::{Process, Sample, TimeRecord, Tool};
 use crate::signal::{SpindleTrack, spindle_track};
 use crate::text::figures;
 
@@ -14,26 +14,26 @@ pub(crate) const OTHER_SPEED: &str = "the spindle did not keep the stated speed:
      under load";
 
 /// What one record says, put in step with the stated speed.
-pub struct RecordReading {
+pub struct RecordReading<S = f64> {
     /// For averages over turns: all changes of the speed are taken out.
     pub averages: CutAnalysis,
     /// For waveforms: the same, but where the speed wanders the record stays as it is, for `diagnose` to find that as a
     /// mistake of the setup (`spindle-speed-variation`).
     pub waveform: CutAnalysis,
     /// The record that `waveform` was read off.
-    pub waveform_record: TimeRecord,
+    pub waveform_record: TimeRecord<S>,
 }
 
 /// Puts the record of one cut in step with the stated speed and reads it. `notices`: what is known of the record already.
 ///
 /// # Errors
 /// Those of [`analyse_cut`].
-pub fn analyse_in_step(
+pub fn analyse_in_step<S: Sample>(
     trials: &CuttingTrials,
     index: usize,
-    record: TimeRecord,
+    record: TimeRecord<S>,
     mut notices: Vec<Notice>,
-) -> Result<RecordReading> {
+) -> Result<RecordReading<S>> {
     let as_read = analyse_cut(trials, index, &record)?;
     let Some(found) = followed(trials.tool, &as_read, &record) else {
         let mut averages = as_read;
@@ -70,13 +70,13 @@ pub fn analyse_in_step(
     })
 }
 
-fn turned_evenly(mut record: TimeRecord, track: &SpindleTrack) -> TimeRecord {
+fn turned_evenly<S: Sample>(mut record: TimeRecord<S>, track: &SpindleTrack) -> TimeRecord<S> {
     let own = record.channels.iter_mut().filter(|c| axis_of(c.role).is_some());
     own.for_each(|channel| channel.samples = track.in_step_samples(&channel.samples));
     record
 }
 
-fn followed(tool: &Tool, analysis: &CutAnalysis, record: &TimeRecord) -> Option<SpindleTrack> {
+fn followed<S: Sample>(tool: &Tool, analysis: &CutAnalysis, record: &TimeRecord<S>) -> Option<SpindleTrack> {
     // A drill's lips make no line that could be relied on.
     if analysis.process != Process::Milling {
         return None;
@@ -86,7 +86,7 @@ fn followed(tool: &Tool, analysis: &CutAnalysis, record: &TimeRecord) -> Option<
     let [from, to] = analysis.steady_s.map(sample);
     let window = from..to.min(record.len());
     let carries = |axis: ForceAxis| analysis.channels.iter().any(|c| c.axis == axis);
-    let channels: Vec<&[f64]> = record
+    let channels: Vec<&[S]> = record
         .channels
         .iter()
         .filter(|c| axis_of(c.role).is_some_and(|axis| axis != ForceAxis::Mz && carries(axis)))

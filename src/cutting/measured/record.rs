@@ -17,7 +17,7 @@ use crate::cutting::measured::teeth::{
     CERTAIN, idle_tooth, one_tooth_alone, parts_of_turn, tooth_back_mm, tooth_passing_too_weak,
 };
 use crate::cutting::waveform::MillingCut;
-use crate::data::{ChannelRole, Cut, CutGeometry, Process, TimeRecord, Tool};
+use crate::data::{ChannelRole, Cut, CutGeometry, Process, Sample, TimeRecord, Tool};
 use crate::signal::{
     self, Air, Clipping, Phases, SignalBlocks, Spindle, ToothLine, find_faults, find_phases, fit_drift,
     highest_order, tooth_line, whole_revolutions,
@@ -59,7 +59,11 @@ const WRONG_DURATION: &str = "the hole took another time than feed, speed and de
 ///
 /// # Errors
 /// The record is unreadable, too short, holds no usable force channel, or no steady cut is found.
-pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord) -> Result<CutAnalysis> {
+pub fn analyse_cut<S: Sample>(
+    trials: &CuttingTrials,
+    cut_index: usize,
+    record: &TimeRecord<S>,
+) -> Result<CutAnalysis> {
     let (tool, cut) = (trials.tool, &trials.cuts[cut_index]);
     let refuse = |problem: String| Error::from(InputError::new(problem).file(&cut.file));
     let rate = record.sample_rate_hz;
@@ -90,8 +94,8 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
         .into_iter()
         .zip(clippings)
         .partition(|(_, clipping)| clipping.is_none());
-    let mut usable: Vec<UsableChannel> = whole.into_iter().map(|(channel, _)| channel).collect();
-    let all: Vec<UsableChannel> = usable
+    let mut usable: Vec<UsableChannel<S>> = whole.into_iter().map(|(channel, _)| channel).collect();
+    let all: Vec<UsableChannel<S>> = usable
         .iter()
         .copied()
         .chain(cut_off.iter().map(|(c, _)| *c))
@@ -116,7 +120,7 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
     };
 
     let carrying = ForceAxis::of(cut.geometry.process());
-    let carriers: Vec<(ForceAxis, &[f64])> = usable
+    let carriers: Vec<(ForceAxis, &[S])> = usable
         .iter()
         .filter(|c| carrying.contains(&c.0))
         .map(|c| (c.0, c.2))
@@ -176,7 +180,7 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
             // A torque has another unit; it speaks where it is alone.
             let forces = || usable.iter().filter(|c| c.0 != ForceAxis::Mz);
             let alone = forces().next().is_none();
-            let own: Vec<&[f64]> = usable
+            let own: Vec<&[S]> = usable
                 .iter()
                 .filter(|c| alone || c.0 != ForceAxis::Mz)
                 .map(|c| &c.2[steady.clone()])
@@ -226,11 +230,11 @@ pub fn analyse_cut(trials: &CuttingTrials, cut_index: usize, record: &TimeRecord
 /// Part of the steady window that may be clipped without much harm.
 const CLIPPED_AT_MOST: f64 = 1e-3;
 /// Is so much of the channel clipped in the steady window that its average is wrong?
-fn is_spoilt(
-    channel: &UsableChannel,
+fn is_spoilt<S: Sample>(
+    channel: &UsableChannel<S>,
     clipping: &Clipping,
     steady: &Range<usize>,
-    record: &TimeRecord,
+    record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
 ) -> bool {
     let axis = channel.0;
@@ -273,13 +277,13 @@ fn wrong_speed(line: &ToothLine, spindle_rpm: f64, teeth: usize) -> String {
     )
 }
 
-type UsableChannel<'a> = (ForceAxis, &'a str, &'a [f64]);
+type UsableChannel<'a, S> = (ForceAxis, &'a str, &'a [S]);
 
-fn usable_channels<'a>(
-    record: &'a TimeRecord,
+fn usable_channels<'a, S: Sample>(
+    record: &'a TimeRecord<S>,
     process: Process,
     notices: &mut Vec<Notice>,
-) -> Vec<UsableChannel<'a>> {
+) -> Vec<UsableChannel<'a, S>> {
     let roles = [
         ChannelRole::ForceX,
         ChannelRole::ForceY,
@@ -299,7 +303,7 @@ fn usable_channels<'a>(
             continue;
         };
         let values = channel.samples.as_slice();
-        if !values.iter().all(|v| v.is_finite()) {
+        if !values.iter().all(|v| v.value().is_finite()) {
             notices.push(notice(CHANNEL_BROKEN));
         } else if values.iter().all(|v| Some(v) == values.first()) {
             notices.push(notice(CHANNEL_DEAD));
@@ -310,11 +314,11 @@ fn usable_channels<'a>(
     usable
 }
 
-fn phases(
+fn phases<S: Sample>(
     cut: &Cut,
     tool: &Tool,
-    record: &TimeRecord,
-    usable: &[UsableChannel],
+    record: &TimeRecord<S>,
+    usable: &[UsableChannel<S>],
     samples_per_revolution: f64,
 ) -> Result<(Phases, bool)> {
     let rate = record.sample_rate_hz;
@@ -324,7 +328,7 @@ fn phases(
     });
     // A drill's side forces say nothing of its engagement.
     let carriers = ForceAxis::of(cut.geometry.process());
-    let mut carrying: Vec<&[f64]> = usable
+    let mut carrying: Vec<&[S]> = usable
         .iter()
         .filter(|c| carriers.contains(&c.0))
         .map(|c| c.2)
@@ -375,12 +379,12 @@ fn phases(
 const UNSTEADY: f64 = 0.1;
 
 /// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does.
-fn unsteady_notice(
-    usable: &[UsableChannel],
+fn unsteady_notice<S: Sample>(
+    usable: &[UsableChannel<S>],
     channels: &[ChannelAnalysis],
     steady: &Range<usize>,
     samples_per_revolution: f64,
-    record: &TimeRecord,
+    record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
 ) {
     let mut squares: Vec<f64> = Vec::new();
@@ -394,7 +398,7 @@ fn unsteady_notice(
                 .drift
                 .at(record.start_s + i as f64 / record.sample_rate_hz)
         };
-        let compensated = |i: usize| values[steady.start + i] - zero(steady.start + i);
+        let compensated = |i: usize| values[steady.start + i].value() - zero(steady.start + i);
         let turns = SignalBlocks::of(steady.len(), compensated, samples_per_revolution);
         squares.resize(turns.len(), 0.0);
         for (k, square) in squares.iter_mut().enumerate() {
@@ -426,13 +430,13 @@ fn is_noise(over_noise: &[f64]) -> bool {
 }
 
 #[allow(clippy::too_many_arguments)]
-fn teeth_notice(
+fn teeth_notice<S: Sample>(
     trials: &CuttingTrials,
     cut: &Cut,
     channels: &[ChannelAnalysis],
-    usable: &[UsableChannel],
+    usable: &[UsableChannel<S>],
     steady: &Range<usize>,
-    record: &TimeRecord,
+    record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
 ) {
     let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.places.is_empty()) else {
@@ -597,7 +601,7 @@ fn duration_notice(cut: &Cut, tool: &Tool, phases: &Phases, rate: f64, notices: 
     }
 }
 
-fn trace(values: &[f64], record: &TimeRecord) -> Trace {
+fn trace<S: Sample>(values: &[S], record: &TimeRecord<S>) -> Trace {
     let stretch = values.len().div_ceil(TRACE_POINTS).max(1);
     let mut trace = Trace {
         time_s: Vec::new(),
@@ -607,10 +611,9 @@ fn trace(values: &[f64], record: &TimeRecord) -> Trace {
     for (k, part) in values.chunks(stretch).enumerate() {
         let middle = (k * stretch) as f64 + 0.5 * (part.len() - 1) as f64;
         trace.time_s.push(record.start_s + middle / record.sample_rate_hz);
-        trace.min.push(part.iter().copied().fold(f64::INFINITY, f64::min));
-        trace
-            .max
-            .push(part.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+        let (min, max) = signal::least_and_greatest(part);
+        trace.min.push(min);
+        trace.max.push(max);
     }
     trace
 }

@@ -1,5 +1,6 @@
 //! Lines of a steady cut that belong to no order of the spindle: vibration of the tool against the workpiece.
 
+use crate::data::Sample;
 use crate::signal::{OrderSpectrum, from_mains_hz, line_amplitude, median};
 
 /// What one cut shows off the comb.
@@ -48,7 +49,7 @@ const MAINS_TOLD: f64 = 3.0;
 const MOST_AIR_STEPS: f64 = 8.0;
 
 /// `spectra`: recorded channel, its spectrum, and a stretch of air. Mains hum that the air shows, or may hold, is none.
-pub fn find_vibration<A: AsRef<[f64]>>(
+pub fn find_vibration<S: Sample, A: AsRef<[S]>>(
     spectra: &[(usize, OrderSpectrum, A)],
     sample_rate_hz: f64,
     spindle_hz: f64,
@@ -123,7 +124,7 @@ pub fn find_vibration<A: AsRef<[f64]>>(
 }
 
 /// Amplitude of a line at `hz` in `air`, where the spectrum that it was found in places it to half its lines' distance.
-fn in_air(air: &[f64], sample_rate_hz: f64, hz: f64, line_hz: f64) -> f64 {
+fn in_air<S: Sample>(air: &[S], sample_rate_hz: f64, hz: f64, line_hz: f64) -> f64 {
     // Long air tells frequencies apart that the spectrum does not: a step of half its own lines' distance misses nothing.
     let step = 0.5 * sample_rate_hz / air.len().max(1) as f64;
     let steps = ((0.5 * line_hz / step).ceil().min(MOST_AIR_STEPS) as i64).max(1);
@@ -155,7 +156,7 @@ const LEAST_AIR: usize = 64;
 
 /// All lines that the orders taken out of `spectra` (recorded channel, its spectrum, a stretch of air) leave standing,
 /// strongest first. `orders_taken`: the orders of `spindle_hz` are out, and what lies against them is their own unsteadiness.
-pub fn standing_lines<A: AsRef<[f64]>>(
+pub fn standing_lines<S: Sample, A: AsRef<[S]>>(
     spectra: &[(usize, OrderSpectrum, A)],
     sample_rate_hz: f64,
     spindle_hz: f64,
@@ -388,7 +389,7 @@ mod tests {
             })
             .collect();
         let spectrum = order_spectrum(&samples, RATE_HZ, RATE_HZ / 51.0, 40).unwrap();
-        let own = [(0, spectrum, Vec::new())];
+        let own = [(0, spectrum, Vec::<f64>::new())];
         assert_eq!(find_vibration(&own, RATE_HZ, 51.0, 2), None);
         // At a speed that has no order there it is one.
         assert!(find_vibration(&own, RATE_HZ, 47.3, 2).is_some());
@@ -417,7 +418,7 @@ mod tests {
         assert!((lines[0].frequency_hz - 100.0).abs() < 0.1);
         assert!((lines[0].channels[0].1 - 60.0).abs() < 0.1);
         assert_eq!(lines[0].channels[0].2, None);
-        let lines = standing_lines(&[(0, with_orders, Vec::new())], RATE_HZ, 50.0, true);
+        let lines = standing_lines(&[(0, with_orders, Vec::<f64>::new())], RATE_HZ, 50.0, true);
         assert_eq!(lines.len(), 1);
     }
 }

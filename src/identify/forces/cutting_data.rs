@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
 use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
-use crate::data::{ChannelRole, Cut, Immersion, Process, TimeRecord, Tool};
+use crate::data::{ChannelRole, Cut, Immersion, Process, Sample, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::identify::forces::asynchronous_lines::{
     AsynchronousLines, StandingLine, find_vibration, standing_lines,
@@ -81,10 +81,10 @@ impl CutData {
     ///
     /// # Errors
     /// No channel that carries the cutting force over two revolutions or more; a tool that cannot have made the cut.
-    pub fn new(
+    pub fn new<S: Sample>(
         tool: &Tool,
         (index, cut): (usize, &Cut),
-        record: &TimeRecord,
+        record: &TimeRecord<S>,
         analysis: &CutAnalysis,
     ) -> Result<CutData> {
         let rate = record.sample_rate_hz;

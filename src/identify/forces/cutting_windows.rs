@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::cutting::CutAnalysis;
-use crate::data::{Process, TimeRecord};
+use crate::data::{Process, Sample, TimeRecord};
 
 const MOST_STEADY_BLOCKS: usize = 40;
 const MOST_AIR_BLOCKS: usize = 20;
@@ -23,7 +23,7 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
-    pub(crate) fn new(analysis: &CutAnalysis, record: &TimeRecord, per_turn: f64) -> Windows {
+    pub(crate) fn new<S: Sample>(analysis: &CutAnalysis, record: &TimeRecord<S>, per_turn: f64) -> Windows {
         let rate = record.sample_rate_hz;
         let sample = |t: f64| (((t - record.start_s) * rate).round().max(0.0) as usize).min(record.len());
         let range = |s: [f64; 2]| sample(s[0])..sample(s[1]);
@@ -79,7 +79,7 @@ impl Windows {
         (self.block_kinds[0]..self.block_kinds[0] + self.block_kinds[1]).contains(&block)
     }
 
-    pub(crate) fn block_s(&self, record: &TimeRecord) -> Vec<[f64; 2]> {
+    pub(crate) fn block_s<S>(&self, record: &TimeRecord<S>) -> Vec<[f64; 2]> {
         let seconds = |s: f64| record.start_s + s / record.sample_rate_hz - self.middle_s;
         self.blocks.iter().map(|b| b.map(seconds)).collect()
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 
+use crate::data::Sample;
 use crate::identify::forces::asynchronous_lines::AsynchronousLines;
 use crate::identify::forces::cutting_windows::Windows;
 use crate::signal::{OrderSpectrum, mean_between};
@@ -25,14 +26,17 @@ pub struct ForceChannel {
 }
 
 /// White noise of a stretch of air: differences of neighbouring samples know no drift and little hum.
-pub(crate) fn sample_std(samples: &[f64]) -> f64 {
-    let squares: f64 = samples.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+pub(crate) fn sample_std<S: Sample>(samples: &[S]) -> f64 {
+    let squares: f64 = samples
+        .windows(2)
+        .map(|w| (w[1].value() - w[0].value()).powi(2))
+        .sum();
     (0.5 * squares / samples.len().saturating_sub(1).max(1) as f64).sqrt()
 }
 
 #[allow(clippy::too_many_arguments)]
-pub(crate) fn force_channel(
-    values: &[f64],
+pub(crate) fn force_channel<S: Sample>(
+    values: &[S],
     zero: impl Fn(usize) -> f64,
     rate: f64,
     window: &Windows,
@@ -94,7 +98,12 @@ pub(crate) fn force_channel(
 }
 
 /// Mean over each of the `blocks` (ascending, apart from one another) of ∫ (value − zero) dt up to the middle of each of its samples.
-fn mean_integrals(values: &[f64], zero: impl Fn(usize) -> f64, rate: f64, blocks: &[[f64; 2]]) -> Vec<f64> {
+fn mean_integrals<S: Sample>(
+    values: &[S],
+    zero: impl Fn(usize) -> f64,
+    rate: f64,
+    blocks: &[[f64; 2]],
+) -> Vec<f64> {
     let mut means = Vec::with_capacity(blocks.len());
     // ∫ up to sample `at`.
     let (mut at, mut integral) = (0, 0.0);
@@ -107,7 +116,7 @@ fn mean_integrals(values: &[f64], zero: impl Fn(usize) -> f64, rate: f64, blocks
             if at as f64 + 1.0 > to {
                 break;
             }
-            integral += values.get(at).map_or(0.0, |v| (v - zero(at)) / rate);
+            integral += values.get(at).map_or(0.0, |v| (v.value() - zero(at)) / rate);
             at += 1;
         }
         means.push(if to > from { sum / (to - from) } else { 0.0 });

@@ -324,7 +324,8 @@ pub fn inspected(files: &[(&Path, &'static str)]) -> String {
         let words: Vec<String> = paths.iter().map(|p| shell_word(p)).collect();
         return format!(
             "if this is a tap test (hammer and sensor), run `lobestone modal {}`; with --output-only if no force was recorded \
-             (idling, cutting)",
+             (idling, cutting). If it holds cutting forces under other names (volts, motor currents), say in a [[channel]] of \
+             campaign.toml which they are: name, in_file, gain",
             words.join(" ")
         );
     }

@@ -7,7 +7,7 @@ use super::contents::{Contents, Digest, Format, MeasurementFile, TimeFile};
 use super::decode::read_bytes_at;
 use super::long::{self, ForceFile, Opened};
 use super::read::{self, no_such, read_file};
-use super::text::{Notes, without_byte_order_mark};
+use super::text::{Notes, is_binary, without_byte_order_mark};
 use super::units::{self, Dimension, Unit};
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::files::regular_file;
@@ -128,10 +128,12 @@ pub fn read_time_with(path: &Path, rules: &[ChannelRule]) -> Result<TimeFile> {
 /// # Errors
 /// As [`read_time_with`].
 pub fn read_forces_with(path: &Path, rules: &[ChannelRule]) -> Result<ForceFile> {
-    let file = match long::open(path) {
+    let named = |header: Header| named_by(path, rules, header).ok();
+    let file = match long::open_named(path, &named) {
         Ok(Opened::Long(long)) => {
-            let is_named = |rule: &ChannelRule| rule.rate_hz.is_none() && rule.measures != Measures::Time;
-            if !rules.iter().all(is_named) {
+            let is_of_time = |rule: &ChannelRule| rule.rate_hz.is_some() || rule.measures == Measures::Time;
+            // Whose times count is looked at with all of them at hand.
+            if !long.is_named && rules.iter().any(is_of_time) {
                 return with_rules(path, rules, long.whole()).map(ForceFile::Short);
             }
             let mut told = Vec::new();
@@ -420,7 +422,7 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, Plain
     };
     regular_file(path)?;
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
-    if !bytes.iter().take(8192).any(|b| *b == 0) {
+    if !is_binary(&bytes) {
         return Ok(None);
     }
     let mut notes = Notes::default();
@@ -531,7 +533,7 @@ fn timeless_records(path: &Path) -> Result<Vec<TimeRecord>> {
     if read_bytes_at(&bytes, false, None, &mut notes).is_ok() {
         return Ok(Vec::new());
     }
-    let times = if bytes.iter().take(8192).any(|b| *b == 0) {
+    let times = if is_binary(&bytes) {
         read_bytes_at(&bytes, false, Some(RATE_HZ), &mut notes).map(|(_, _, contents)| contents.times)
     } else {
         let text = &*without_byte_order_mark(&bytes);
@@ -555,12 +557,20 @@ fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>>
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
     let digest = Digest::of(&bytes);
     let bytes = &*without_byte_order_mark(&bytes);
-    if bytes.iter().take(8192).any(|b| *b == 0) {
+    if is_binary(bytes) {
         return Ok(None);
     }
-    let Some(mut header) = Header::find(bytes) else {
+    let Some(header) = Header::find(bytes) else {
         return Ok(None);
     };
+    let header = named_by(path, rules, header)?;
+    let mut notes = Notes::default();
+    let record = force::read(bytes, &header, &mut notes).map_err(|e| Error::from(e.file(path)))?;
+    Ok(Some((vec![record], notes.into_warnings(), digest)))
+}
+
+/// The header with the names, the time and the rate that the rules give.
+fn named_by(path: &Path, rules: &[ChannelRule], mut header: Header) -> Result<Header> {
     if header.names.is_empty() {
         header.names = (1..=header.columns).map(|i| format!("column {i}")).collect();
     }
@@ -600,9 +610,7 @@ fn plain_table(path: &Path, rules: &[ChannelRule]) -> Result<Option<PlainTable>>
             )
             .into());
     }
-    let mut notes = Notes::default();
-    let record = force::read(bytes, &header, &mut notes).map_err(|e| Error::from(e.file(path)))?;
-    Ok(Some((vec![record], notes.into_warnings(), digest)))
+    Ok(header)
 }
 
 #[cfg(test)]

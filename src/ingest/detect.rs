@@ -30,9 +30,6 @@ pub(super) enum Detected {
     Numpy,
 }
 
-/// How many bytes decide whether a file is text.
-const LOOK_AT: usize = 8192;
-
 /// Decides the format. The error of an unreadable format says what it is and how to export it.
 pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Format, String), InputError> {
     if bytes.trim_ascii().is_empty() {
@@ -83,10 +80,8 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
             "starts with \"-1\" and a dataset number".into(),
         ));
     }
-    let head = &bytes[..bytes.len().min(LOOK_AT)];
-    let odd = head.iter().filter(|b| **b < 9 || (14..32).contains(*b)).count();
-    if odd > 0 {
-        let (what, remedy) = if is_dwd_named || mentions(head, b"DynoWare") || mentions(head, b"Kistler") {
+    if text::is_binary(bytes) {
+        let (what, remedy) = if is_dwd_named || mentions(bytes, b"DynoWare") || mentions(bytes, b"Kistler") {
             (
                 "a DynoWare .dwd recording: an undocumented binary format",
                 "in DynoWare: File, Export, with header, as text",
@@ -182,8 +177,8 @@ fn abbreviated(names: &[String]) -> String {
     few.join(", ") + more
 }
 
-fn mentions(head: &[u8], word: &[u8]) -> bool {
-    head.windows(word.len()).any(|w| w == word)
+fn mentions(bytes: &[u8], word: &[u8]) -> bool {
+    memchr::memmem::find(bytes, word).is_some()
 }
 
 /// Formats of others by their first bytes: what it is, and how to get at the data.

@@ -12,7 +12,7 @@ use super::text::{self, Notes};
 use crate::data::{Channel, Sample, TimeRecord};
 use crate::files::regular_file;
 use crate::ingest::formats::force::Pieces;
-use crate::ingest::tables::table::{Table, holds};
+use crate::ingest::tables::table::{Header, Table, holds};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
 
@@ -22,7 +22,7 @@ const SHORT: usize = 64 << 20;
 const SHORT_FOR_SURVEY: usize = 8 << 20;
 /// Bytes of text held at once of a longer one: few enough for text and numbers to stay in the processor's cache between one
 /// look at them and the next.
-const PIECE: usize = 4 << 20;
+const PIECE: usize = 2 << 20;
 
 /// A file that was read, or one that is read piece by piece.
 pub(super) enum Opened {
@@ -57,6 +57,8 @@ pub(super) struct LongRecord {
     at_end: bool,
     /// Bytes of text for each sample, from the first piece.
     bytes_per_sample: f64,
+    /// It became a time table by what a campaign says of it.
+    pub(super) is_named: bool,
     notes: Notes,
     progress: Progress,
 }
@@ -110,7 +112,7 @@ pub fn survey(path: &Path) -> Result<Survey> {
             file,
         }
     };
-    match open_by(path, SHORT_FOR_SURVEY, PIECE)? {
+    match open_by(path, SHORT_FOR_SURVEY, PIECE, &|_| None)? {
         Opened::Read(file) => Ok(of_file(file)),
         // Some can be read as a whole only, those with uneven times among them.
         Opened::Long(long) if long.bytes <= SHORT as u64 => {
@@ -149,10 +151,18 @@ fn survey_by_pieces(mut long: LongRecord) -> Result<Survey> {
 
 /// Reads a file, or opens it as a long record.
 pub(super) fn open(path: &Path) -> Result<Opened> {
-    open_by(path, SHORT, PIECE)
+    open_by(path, SHORT, PIECE, &|_| None)
 }
 
-fn open_by(path: &Path, short: usize, piece: usize) -> Result<Opened> {
+/// As [`open`]; `named` makes a time table of what is none by itself.
+pub(super) fn open_named(path: &Path, named: Named) -> Result<Opened> {
+    open_by(path, SHORT, PIECE, named)
+}
+
+/// Gives a header without names or times both, where it can.
+type Named<'a> = &'a dyn Fn(Header) -> Option<Header>;
+
+fn open_by(path: &Path, short: usize, piece: usize, named: Named) -> Result<Opened> {
     let refused = |e| Error::io(path, e);
     regular_file(path)?;
     let mut file = File::open(path).map_err(refused)?;
@@ -166,8 +176,13 @@ fn open_by(path: &Path, short: usize, piece: usize) -> Result<Opened> {
         .map_err(refused)?;
     // Of the rows of a long record nothing but what is not yet read stays in `head`.
     let head_digest = Digest::of(&head);
-    if !is_short && let Some(long) = long_record(path, &mut head, bytes) {
-        let (format, why, pieces, notes) = long;
+    if !is_short && let Some(long) = long_record(path, &mut head, bytes, named) {
+        let Found {
+            format,
+            why,
+            pieces,
+            is_named,
+        } = long;
         let line = pieces.header.data_line;
         let mut text = Text {
             file,
@@ -187,7 +202,8 @@ fn open_by(path: &Path, short: usize, piece: usize) -> Result<Opened> {
             line,
             at_end: false,
             bytes_per_sample: 0.0,
-            notes,
+            is_named,
+            notes: Notes::default(),
             progress: Progress::new(
                 format!("reading {}", path.display()),
                 bytes.div_ceil(piece as u64) as usize,
@@ -218,8 +234,16 @@ fn is_dwd_named(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dwd"))
 }
 
+/// A file that can be read by pieces.
+struct Found {
+    format: Format,
+    why: String,
+    pieces: Pieces,
+    is_named: bool,
+}
+
 /// Decides from the first piece of a file whether it is a table that can be read by pieces; leaves the rows in `head`.
-fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, String, Pieces, Notes)> {
+fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64, named: Named) -> Option<Found> {
     debug_assert!(bytes > head.len() as u64);
     if head.starts_with(b"\xFF\xFE") || head.starts_with(b"\xFE\xFF") {
         return None;
@@ -227,9 +251,13 @@ fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, S
     let whole_lines = memchr::memrchr(b'\n', head)? + 1;
     let text = text::without_byte_order_mark(&head[..whole_lines]);
     let mark = whole_lines - text.len();
-    let (detected, format, why) = detect::detect(&text, is_dwd_named(path)).ok()?;
-    let Detected::TimeTable(header) = detected else {
-        return None;
+    let (header, format, why, is_named) = match detect::detect(&text, is_dwd_named(path)) {
+        Ok((Detected::TimeTable(header), format, why)) => (header, format, why, false),
+        Ok(_) => return None,
+        Err(_) => {
+            let why = "channels as campaign.toml has them".to_owned();
+            (named(Header::find(&text)?)?, Format::TimeCsv, why, true)
+        }
     };
     let rows = text.get(header.data_at..).unwrap_or_default();
     if header.decimal_comma_between_commas || holds(rows, b'"') {
@@ -239,7 +267,12 @@ fn long_record(path: &Path, head: &mut Vec<u8>, bytes: u64) -> Option<(Format, S
     let data_at = mark + pieces.header.data_at;
     drop(text);
     head.drain(..data_at);
-    Some((format, why, pieces, Notes::default()))
+    Some(Found {
+        format,
+        why,
+        pieces,
+        is_named,
+    })
 }
 
 impl LongRecord {
@@ -399,7 +432,7 @@ mod tests {
         let file = log(|_| ());
         let whole = super::super::read_file(file.path()).unwrap();
         let record = &whole.contents.times[0];
-        let opened = open_by(file.path(), 4096, 4096).unwrap();
+        let opened = open_by(file.path(), 4096, 4096, &|_| None).unwrap();
         let Opened::Long(long) = opened else {
             panic!("read as a whole")
         };
@@ -424,8 +457,31 @@ mod tests {
         assert!(!is_told_by_half(&[1e4, 1e4 + 1e-5]));
     }
 
+    #[test]
+    fn a_table_without_names_is_read_by_pieces_where_a_campaign_names_it() {
+        let file = log(|text| *text = text.split_off(text.find("\n0.0").unwrap() + 1));
+        let named = |mut header: Header| {
+            header.names = (1..=header.columns).map(|i| format!("column {i}")).collect();
+            header.lines.push("Sampling rate [Hz]:,2000".into());
+            Some(header)
+        };
+        assert!(matches!(
+            open_by(file.path(), 9000, 9000, &|_| None),
+            Err(Error::Input(_))
+        ));
+        let Ok(Opened::Long(long)) = open_by(file.path(), 9000, 9000, &named) else {
+            panic!("not read by pieces")
+        };
+        assert!(long.is_named);
+        let whole = long.whole().unwrap();
+        let record = &whole.contents.times[0];
+        // One in 37 rows is missing, and nothing tells it.
+        assert_eq!((record.len(), record.channels.len()), (5837, 4));
+        assert_eq!(record.channels[1].samples[3], 3.0 * 3.0 - 300.0);
+    }
+
     fn by_pieces(path: &Path, piece: usize) -> Result<MeasurementFile> {
-        match open_by(path, piece, piece)? {
+        match open_by(path, piece, piece, &|_| None)? {
             Opened::Long(long) => long.whole(),
             Opened::Read(_) => panic!("read as a whole"),
         }

@@ -3,7 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::text::{Notes, without_byte_order_mark};
+use super::text::{Notes, is_binary, without_byte_order_mark};
 use super::units;
 use crate::ingest::formats::force;
 use crate::ingest::tables::table::Header;
@@ -123,7 +123,7 @@ pub fn plain_columns(path: &Path) -> Result<Option<Vec<PlainColumn>>> {
     file.take(START).read_to_end(&mut bytes).map_err(refused)?;
     let text = without_byte_order_mark(&bytes);
     let whole = memchr::memrchr(b'\n', &text).map_or(text.len(), |at| at + 1);
-    if text.contains(&0) {
+    if is_binary(&text) {
         return Ok(None);
     }
     let is_plain = |header: &Header| header.names.is_empty() || !force::is_time_table(header);

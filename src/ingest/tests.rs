@@ -63,20 +63,48 @@ fn the_last_of_titled_sections_is_the_record() {
         "*** General Infos ***\t\t\t\nVersion\tDate\tSample Rate (Hz)\tDecimal Separator\n9\t2024-05-30:14:06:14\t100\tComma\n\
          \t\t\t\n*** Program ***\t\t\t\nStep Nb\tStroke (mm)\tRPM\tFeed (mm/s)\n0,000\t0,000\t0,000\t0,000\n\
          1,000\t50,000\t1500,000\t1,000\n2,000\t50,000\t320,000\t0,160\n3,000\t50,000\t1500,000\t1,000\n\t\t\t\n\
-         *** Datas ***\t\t\t\nPosition (mm)\tI Torque (A)\tI Thrust (A)\tStep (nb)\n",
+         *** Datas ***\t\t\t\nPosition (mm)\tI Torque (A)\tI Thrust (A)\tTorque Power (W)\n",
     );
     for i in 0..50 {
         text += &format!("-0,{i:03}\t4,5{:02}\t0,1{:02}\t1,000\n", i * 7 % 100, i * 3 % 100);
     }
+    // Some end a name as C does.
+    text.insert_str(text.find("Stroke").unwrap(), "Light\0");
+    text.push_str(&"-0,050\t4,500\t0,100\t1,000\n".repeat(50));
     let (record, _) = time(&text);
-    assert_eq!((record.sample_rate_hz, record.len()), (100.0, 50));
+    assert_eq!((record.sample_rate_hz, record.len()), (100.0, 100));
     let names: Vec<&str> = record.channels.iter().map(|c| c.name.as_str()).collect();
     assert_eq!(
         names,
-        ["Position (mm)", "I Torque (A)", "I Thrust (A)", "Step (nb)"]
+        [
+            "Position (mm)",
+            "I Torque (A)",
+            "I Thrust (A)",
+            "Torque Power (W)"
+        ]
     );
     assert!(record.channels.iter().all(|c| c.role == ChannelRole::Other));
     assert!((record.channels[1].samples[1] - 4.507).abs() < 1e-12);
+}
+
+/// Kistler's BioWare, which writes as DynoWare's younger sister does: no unit below `abs time (s)`.
+#[test]
+fn a_line_of_units_may_begin_with_none() {
+    let mut text = String::from(
+        "BioWare Version 5.4.8.0 Export\nDevice:\tPlate 1 9281CA\tPlate 1 9281CA\tPlate 1 9281CA\nRate (Hz):\t100.0\t100.0\t100.0\n\
+         Description\t\nabs time (s)\tFx\tFz\tMz\n\tN\tkN\tN m\n",
+    );
+    for i in 0..40 {
+        text += &format!("{:.6}\t{}.5\t0.{:03}\t1.25\n", f64::from(i) * 0.01, i, i);
+    }
+    let (record, _) = time(&text);
+    assert_eq!((record.sample_rate_hz, record.len()), (100.0, 40));
+    let roles: Vec<ChannelRole> = record.channels.iter().map(|c| c.role).collect();
+    assert_eq!(
+        roles,
+        [ChannelRole::ForceX, ChannelRole::ForceZ, ChannelRole::TorqueZ]
+    );
+    assert!((record.channels[1].samples[7] - 7.0).abs() < 1e-9);
 }
 
 /// The twenty header lines of DynoWare 2.5, names and units, with one separator.

@@ -12,6 +12,17 @@ pub fn decode(bytes: &[u8]) -> String {
     }
 }
 
+/// Bytes that decide whether a file is text.
+const LOOK_AT: usize = 8192;
+
+/// Is this no text? Control characters tell; a lone one among a thousand bytes, such as the end of a string that a program wrote with it,
+/// does not.
+pub fn is_binary(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(LOOK_AT)];
+    let odd = head.iter().filter(|b| **b < 9 || (14..32).contains(*b)).count();
+    odd > head.len() / 1000
+}
+
 /// Drops a UTF-8 byte order mark, turns UTF-16 (spreadsheets call it "Unicode text") into UTF-8.
 pub fn without_byte_order_mark(bytes: &[u8]) -> Cow<'_, [u8]> {
     let utf16 = |order: fn([u8; 2]) -> u16| {

@@ -42,6 +42,8 @@ impl Dimension {
     pub const PRESSURE: Dimension = Dimension([-1, -2, 1, 0]);
     /// Volt; charges of piezoelectric sensors count as voltages.
     pub const VOLTAGE: Dimension = Dimension([0, 0, 0, 1]);
+    /// Watt.
+    pub const POWER: Dimension = Dimension([2, -3, 1, 0]);
     /// Ampere: watt per volt.
     pub const CURRENT: Dimension = Dimension([2, -3, 1, -1]);
 
@@ -86,6 +88,7 @@ impl Dimension {
             Dimension::PRESSURE => ("pressure", "Pa"),
             Dimension::VOLTAGE => ("voltage", "V"),
             Dimension::CURRENT => ("current", "A"),
+            Dimension::POWER => ("power", "W"),
             _ => return None,
         })
     }
@@ -290,6 +293,8 @@ fn named(name: &str) -> Option<(f64, Dimension)> {
         "kg" => (1.0, Dimension([0, 0, 1, 0])),
         "g" | "gn" | "G" => (STANDARD_GRAVITY, D::ACCELERATION),
         "A" => (1.0, D::CURRENT),
+        "W" => (1.0, D::POWER),
+        "kW" => (1e3, D::POWER),
         "mA" => (1e-3, D::CURRENT),
         "N" => (1.0, D::FORCE),
         "mN" => (1e-3, D::FORCE),

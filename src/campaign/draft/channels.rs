@@ -47,7 +47,7 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
             let unit = Entry::new(
                 "unit",
                 Kind::Text,
-                "unit of the values in the file: N, kN, V, mV, pC",
+                "unit of the values in the file: N, kN, V, mV, pC, A (counts of a converter: gain_n_per_unit instead)",
                 "V",
             );
             making.add(unit, &[])?;

@@ -375,12 +375,12 @@ pub(crate) const CHANNEL: [Key; 10] = [
     may(
         "unit",
         Holds::Text,
-        "Of the values: N, kN, V, mV, pC, N·m; of the time s, ms",
+        "Of the values: N, kN, V, mV, pC, A, N·m; of the time s, ms",
     ),
     may(
         "gain",
         Holds::Text,
-        "With its units: \"500 N/V\", \"10 mV/N\", \"-3.9 pC/N\"",
+        "With its units: \"500 N/V\", \"10 mV/N\", \"-3.9 pC/N\", \"350 N/A\"",
     ),
     may(
         "gain_n_per_unit",

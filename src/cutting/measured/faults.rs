@@ -56,9 +56,12 @@ pub fn repair_record<S: Sample>(record: &mut TimeRecord<S>, spindle_rpm: f64) ->
                 time(r)
             )
         });
+        let ranges = || faults.spikes.iter().chain(&faults.stuck).chain(&filled);
+        if ranges().next().is_none() {
+            continue;
+        }
         let mut bad = vec![false; values.len()];
-        let ranges = faults.spikes.iter().chain(&faults.stuck).chain(&filled);
-        ranges.for_each(|r| bad[r.clone()].fill(true));
+        ranges().for_each(|r| bad[r.clone()].fill(true));
         let count = bad.iter().filter(|b| **b).count();
         let notice = |kind, detail: String| Notice { kind, detail };
         if count as f64 > BAD_AT_MOST * values.len() as f64 {
@@ -73,9 +76,7 @@ pub fn repair_record<S: Sample>(record: &mut TimeRecord<S>, spindle_rpm: f64) ->
         }
         notices.extend(stuck.map(|detail| notice(STUCK, detail)));
         notices.extend(spikes.map(|detail| notice(SPIKES, detail)));
-        if count > 0 {
-            substitute(&mut channel.samples, &bad, per_turn);
-        }
+        substitute(&mut channel.samples, &bad, per_turn);
     }
     notices
 }

@@ -51,6 +51,10 @@ const TOOTH_STANDS_BACK: &str = "one tooth cuts less than the others and the nex
 const TEETH_DIFFER: &str = "the teeth cut unevenly: the tool runs out, or one of them is chipped or set low; near the ends of the \
      immersion the lower one does not cut, so that the edge coefficients come out low (tooth_radius_offset_mm in [tool] takes it into \
      account)";
+const IMPOSSIBLE: &str = "no machine tool bears such a load: the unit or the gain of the channel is wrong, or its values are no forces \
+     (unit and gain in a [[channel]] of campaign.toml)";
+/// N (torques: N·m).
+const LARGEST_LOAD: f64 = 1e6;
 const SHORT_WINDOW: &str = "steady window shorter than 5 revolutions";
 const SPIKES: &str = "revolutions with spikes left out of the average";
 const WRONG_DURATION: &str = "the hole took another time than feed, speed and depth say: check them";
@@ -159,6 +163,20 @@ pub fn analyse_cut<S: Sample>(
             }
         })
         .collect();
+    for channel in &channels {
+        let mean = channel.mean.average.value;
+        if mean.abs() > LARGEST_LOAD {
+            notices.push(Notice {
+                kind: IMPOSSIBLE,
+                detail: format!(
+                    "{}: {} {} on average",
+                    channel.axis.label(),
+                    figures(mean, 3),
+                    channel.axis.unit()
+                ),
+            });
+        }
+    }
     let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
     air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
     unsteady_notice(

@@ -57,7 +57,11 @@ const MOMENT_WORDS: [&str; 9] = [
     "扭矩",
 ];
 /// What a channel with a force's name is not the force itself for.
-const NO_FORCE: [&str; 29] = [
+const NO_FORCE: [&str; 33] = [
+    "power",
+    "leistung",
+    "puissance",
+    "potencia",
     "max",
     "min",
     "mean",

@@ -629,7 +629,12 @@ const COMMENTS: [char; 2] = ['#', '%'];
 
 /// Names as they stand behind a comment sign too.
 fn split_names(line: &str, delimiter: Delimiter) -> Vec<String> {
-    split_line(line.trim_start().trim_start_matches(COMMENTS), delimiter)
+    // A line of units may begin with an empty field: the time's own is in its name.
+    let line = match delimiter {
+        Delimiter::Byte(b'\t') => line.trim_start_matches(' '),
+        _ => line.trim_start(),
+    };
+    split_line(line.trim_start_matches(COMMENTS), delimiter)
 }
 
 /// The line of names where it is not the last one above the numbers (units below it are looked at by the caller): as many

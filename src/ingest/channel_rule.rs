@@ -574,6 +574,14 @@ fn named_by(path: &Path, rules: &[ChannelRule], mut header: Header) -> Result<He
     if header.names.is_empty() {
         header.names = (1..=header.columns).map(|i| format!("column {i}")).collect();
     }
+    // By its place a column is found whatever it is called.
+    for rule in rules {
+        if let Source::Column(at) = rule.source
+            && let Some(name) = at.checked_sub(1).and_then(|at| header.names.get_mut(at))
+        {
+            *name = format!("column {at}");
+        }
+    }
     for rule in rules.iter().filter(|r| r.measures == Measures::Time) {
         let at = match &rule.source {
             Source::Column(at) => at.checked_sub(1).filter(|at| *at < header.columns),

@@ -22,7 +22,7 @@ const SHORT: usize = 64 << 20;
 const SHORT_FOR_SURVEY: usize = 8 << 20;
 /// Bytes of text held at once of a longer one: few enough for text and numbers to stay in the processor's cache between one
 /// look at them and the next.
-const PIECE: usize = 2 << 20;
+const PIECE: usize = 4 << 20;
 
 /// A file that was read, or one that is read piece by piece.
 pub(super) enum Opened {

@@ -29,6 +29,8 @@ pub struct PlainColumn {
     pub step: Option<f64>,
     /// Each value is above the one before.
     pub rises: bool,
+    /// It has a name and knows two values only: a label or a trigger, no signal. (Without a name it may be a quiet channel.)
+    pub is_state: bool,
     /// Rows that were looked at.
     pub rows: usize,
 }
@@ -54,6 +56,7 @@ impl PlainColumn {
             range: [low, high],
             step: even().filter(|_| is_first),
             rises: values.is_sorted_by(|a, b| a < b),
+            is_state: name.is_some() && is_state(values),
             rows: values.len(),
         }
     }
@@ -90,6 +93,21 @@ impl PlainColumn {
     }
 }
 
+/// Values that a state takes, at most, and rows from which so few cannot be chance.
+const STATES: usize = 2;
+const ROWS_FOR_STATES: usize = 500;
+
+fn is_state(values: &[f64]) -> bool {
+    let mut states: Vec<f64> = Vec::new();
+    values.len() >= ROWS_FOR_STATES
+        && values.iter().all(|v| {
+            if !states.contains(v) {
+                states.push(*v);
+            }
+            states.len() <= STATES
+        })
+}
+
 /// Signals in the order in which recorders write them.
 pub const SIGNALS: [&str; 4] = ["fx", "fy", "fz", "mz"];
 
@@ -97,11 +115,14 @@ pub const SIGNALS: [&str; 4] = ["fx", "fy", "fz", "mz"];
 /// for [`SIGNALS`] in their order. Ends where these do; where there are more columns than these, what follows the three forces is as
 /// likely an accelerometer as a torque.
 pub fn taken_for(columns: &[PlainColumn]) -> impl Iterator<Item = (usize, &PlainColumn, &'static str)> {
-    let count = columns.iter().filter(|c| c.step.is_none()).count();
+    let count = columns.iter().filter(|c| c.step.is_none() && !c.is_state).count();
     let mut signals = SIGNALS
         .into_iter()
         .take(if count > SIGNALS.len() { 3 } else { SIGNALS.len() });
-    let own = columns.iter().enumerate().filter(|(_, c)| !c.counts());
+    let own = columns
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| !c.counts() && !c.is_state);
     own.map_while(move |(i, column)| {
         let name = if column.is_clock() {
             "time"
@@ -168,7 +189,7 @@ fn channel_lines(columns: &[PlainColumn]) -> String {
 /// For columns whose names say nothing: the lines of `campaign.toml` that make forces of them, where they may be such.
 pub(super) fn lines_for_names(bytes: &[u8], header: &Header) -> Option<String> {
     let columns = columns(bytes, header);
-    let signals = columns.iter().filter(|c| c.step.is_none()).count();
+    let signals = columns.iter().filter(|c| c.step.is_none() && !c.is_state).count();
     let may_be = (1..=SHOWN).contains(&signals) && columns.iter().all(|c| !c.rises || c.step.is_some());
     may_be.then(|| channel_lines(&columns))
 }

@@ -356,6 +356,7 @@ fn may_be_forces(columns: &[PlainColumn]) -> bool {
         [time, signals @ ..] if is_time(time) => (true, signals),
         all => (false, all),
     };
+    let signals: Vec<&PlainColumn> = signals.iter().filter(|c| !c.is_state).collect();
     let is_long = signals.iter().all(|c| c.rows >= ROWS_OF_A_RECORD);
     let is_named = signals.iter().any(|c| c.name.is_some());
     let least = if has_time && is_long { 1 } else { 2 };

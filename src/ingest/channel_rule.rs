@@ -388,8 +388,12 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
                 _ => {
                     let remedy =
                         "give a gain for the unit the values are in, or leave it out where they are forces";
+                    let of_gain = match electric.dimension {
+                        Dimension::CURRENT => "amperes",
+                        _ => "volts or charge",
+                    };
                     return Err(refuse(
-                        "its gain is for another unit than that of its values".into(),
+                        format!("its gain is for {of_gain}, its values are not"),
                         remedy,
                     ));
                 }

@@ -4,6 +4,7 @@
 pub(crate) mod begin;
 mod campaign_args;
 mod cli;
+pub(crate) mod document;
 pub(crate) mod find;
 pub(crate) mod grow;
 pub(crate) mod many;

@@ -1,5 +1,7 @@
 //! What a command hands back.
 
+use serde::Serialize;
+
 use super::text;
 
 /// What a command has to say: the document of docs/json.md, and the same for a person.
@@ -14,7 +16,8 @@ pub struct Outcome {
 
 impl Outcome {
     /// With the next sensible step: `next_step` in the document, the last line of the text.
-    pub fn new(mut json: serde_json::Value, mut text: String, next_step: Option<String>) -> Self {
+    pub fn new(document: impl Serialize, mut text: String, next_step: Option<String>) -> Self {
+        let mut json = serde_json::json!(document);
         if let Some(step) = next_step.as_ref().filter(|_| !crate::progress::is_silent()) {
             text += &format!("\n{} {step}\n", text::Emphasis::Strong.on("Next:"));
         }

@@ -18,7 +18,6 @@ pub use fit::estimate::{
     BOOTSTRAP_CUTS, BOOTSTRAP_DRAWS, CfcOptions, CoefficientEstimate, HUBER_THRESHOLD, RegressionMethod,
     bootstrap, estimate,
 };
-pub use fit::group::by_axis;
 pub use fit::group::{Coefficient, ForceGroup, Influence, KnownValue, RegressionPoint};
 pub use fit::kienzle::{KienzleComponent, KienzleFit, Preferred, TellingFeed, kienzle};
 pub use fit::outlier::{CutMisfit, misfits, studentized};

@@ -1,7 +1,7 @@
 //! What a technician wants to know of an effect besides what it does to the model.
 
 /// How to check an effect without this program, what sizes to expect, and where to read on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Background {
     /// In the lab, with what a lab has.
     pub lab_check: &'static str,

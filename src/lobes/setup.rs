@@ -8,7 +8,7 @@ use crate::lobes::dynamics::tool_beam::{BeamSegment, ToolBeam};
 use crate::lobes::milling::periodic_force::PeriodicForce;
 
 /// Cutting coefficients that lobes need, N/mm².
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LobeCoefficients {
     /// Tangential coefficient Ktc, N/mm².
     pub ktc_n_per_mm2: f64,

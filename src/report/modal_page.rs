@@ -39,7 +39,7 @@ const MOST_LINES: usize = 4000;
 pub struct Extras<'a> {
     pub geometry: Option<&'a Geometry>,
     /// By set; `None` where nothing was compared.
-    pub comparisons: Vec<Option<ShapeComparison>>,
+    pub comparisons: &'a [Option<ShapeComparison>],
     /// Files or campaign folder as they were given, and the fingerprint of what is in them.
     pub inputs: Vec<String>,
     pub fingerprint: Option<String>,

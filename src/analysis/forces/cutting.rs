@@ -1,12 +1,14 @@
 //! A campaign's force records: the waveform model fitted and compared, and its coefficients compared with those of the mean forces.
 
-use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use crate::Result;
 use crate::analysis::forces::channel_check::wrong_channels;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process};
-use crate::cutting::{CfcResult, ForceGroup};
+use crate::cutting::{CfcResult, ForceGroup, KnownValue};
 use crate::discrepancy::CuttingComparison;
 use crate::discrepancy::setup::{SetupCheck, SetupFinding, examine_cutting};
 use crate::identify::forces::cutting_data::processes;
@@ -108,14 +110,29 @@ fn warnings_of(calibration: &Calibration) -> Vec<String> {
     warnings
 }
 
-/// Coefficients of each of `result`'s groups from the whole waveform: `{key: {value, std_error}, nrms, noise_floor_nrms,
-/// chi2_per_value, converged}`; null where the waveform does not determine a coefficient. One entry a group, null where
+/// Coefficients of a group of cuts from the whole waveform.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct WaveformCoefficients {
+    /// By their keys, which say the units; `None` where the waveform does not determine one.
+    #[serde(flatten)]
+    pub coefficients: BTreeMap<String, Option<KnownValue>>,
+    /// Error over the signal.
+    pub nrms: f64,
+    /// nrms of a perfect model.
+    pub noise_floor_nrms: f64,
+    /// Weighted misfit per number compared: 1 where only noise is left.
+    pub chi2_per_value: f64,
+    /// Whether the fit came to its end.
+    pub converged: bool,
+}
+
+/// Coefficients of each of `result`'s groups from the whole waveform; `None` where
 /// its waveforms cannot be fitted. And what the waveforms say about channels that are wrong in all records, and about other
 /// mistakes of the setup.
 pub fn waveform_groups(
     campaign: &Workbench,
     result: &CfcResult,
-) -> (Vec<Value>, Vec<String>, Vec<SetupFinding>) {
+) -> (Vec<Option<WaveformCoefficients>>, Vec<String>, Vec<SetupFinding>) {
     let loaded: Vec<(Process, Result<CuttingData>)> = processes(&campaign.cuts)
         .into_iter()
         .map(|p| (p, CuttingData::on(campaign, p)))
@@ -140,33 +157,32 @@ pub fn waveform_groups(
                 .find(|(p, _)| *p == group.process)
                 .and_then(|(_, d)| d.as_ref().ok());
             data.and_then(|data| waveform_group(data, group).ok())
-                .unwrap_or(Value::Null)
         })
         .collect();
     (groups, warnings, setup)
 }
 
-fn waveform_group(data: &CuttingData, group: &ForceGroup) -> Result<Value> {
+fn waveform_group(data: &CuttingData, group: &ForceGroup) -> Result<WaveformCoefficients> {
     let own = data.filtered(|i| group.cuts.contains(&data.cuts[i].id));
     let model = CuttingModel::new(&own, true)?;
     let calibration = calibrate_cutting(&model, &own)?;
     let totals = cutting_comparison(&model, &own, &calibration.theta)?.totals;
-    let mut map = Map::new();
-    for (parameter, estimate) in model.parameters.iter().zip(&calibration.parameters) {
+    let estimates = model.parameters.iter().zip(&calibration.parameters);
+    let coefficients = estimates.map(|(parameter, estimate)| {
         // What the prior says and the data do not is no answer.
         let prior = parameter.prior.map_or(f64::INFINITY, |p| p.std);
-        let Estimate { value, std_error, .. } = estimate;
-        let known = *std_error < 0.1 * prior;
-        let entry = if known {
-            json!({"value": value, "std_error": std_error})
-        } else {
-            Value::Null
-        };
-        map.insert(parameter.name.clone(), entry);
-    }
-    map.insert("nrms".into(), json!(totals.nrms));
-    map.insert("noise_floor_nrms".into(), json!(totals.noise_floor_nrms));
-    map.insert("chi2_per_value".into(), json!(calibration.reduced_chi2));
-    map.insert("converged".into(), json!(calibration.converged()));
-    Ok(Value::Object(map))
+        let Estimate { value, std_error, .. } = *estimate;
+        let known = (std_error < 0.1 * prior).then_some(KnownValue {
+            value,
+            std_error: Some(std_error),
+        });
+        (parameter.name.clone(), known)
+    });
+    Ok(WaveformCoefficients {
+        coefficients: coefficients.collect(),
+        nrms: totals.nrms,
+        noise_floor_nrms: totals.noise_floor_nrms,
+        chi2_per_value: calibration.reduced_chi2,
+        converged: calibration.converged(),
+    })
 }

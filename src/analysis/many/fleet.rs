@@ -114,10 +114,12 @@ pub struct RobotHistory {
     /// Why, in sentences.
     pub reasons: Vec<String>,
     /// All campaigns, oldest first.
+    #[serde(rename = "campaigns")]
     pub nights: Vec<Night>,
     /// The last verdict names something else than the one before, or is the first and names something.
     pub new_verdict: bool,
     /// Of the quantities that the last campaign has; the one that moved farthest first.
+    #[serde(rename = "parameters")]
     pub charts: Vec<ControlChart>,
 }
 

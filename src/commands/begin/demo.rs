@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use serde_json::json;
 
 use crate::analysis::forces::force_records::identify_forces;
 use crate::analysis::modes::stick_shapes;
@@ -17,7 +16,7 @@ use crate::builtin::{BuiltinCampaign, FIRST_CELL, SECOND_CELL};
 use crate::campaign::Campaign;
 use crate::commands::Outcome;
 use crate::commands::text::{number, percent};
-use crate::commands::write::report;
+use crate::commands::write::report::FilesOfReport;
 use crate::cutting::{CfcOptions, CfcResult};
 use crate::files::write_atomically;
 use crate::identify::{Options, StructureCase};
@@ -146,18 +145,28 @@ pub fn run(args: DemoArgs) -> Result<Outcome> {
         },
     )?;
 
-    let mut json = report::document(&files);
-    json["steps"] = json!(story.steps);
-    json["dir"] = json!(dir);
     let next = format!(
         "open {} in a browser, then begin with your own files: run `lobestone init FOLDER`",
         files.html.display()
     );
     Ok(Outcome::new(
-        json,
+        Document {
+            steps: &story.steps,
+            dir,
+            files: FilesOfReport::of(&files),
+        },
         describe(&story.steps, began.elapsed()),
         Some(next),
     ))
+}
+
+/// What `demo` did.
+#[derive(Serialize)]
+struct Document<'a> {
+    steps: &'a [Step],
+    dir: &'a Path,
+    #[serde(flatten)]
+    files: FilesOfReport<'a>,
 }
 
 /// What the model explains.

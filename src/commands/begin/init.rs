@@ -1,14 +1,15 @@
 //! `lobestone init DIR`: a campaign of a folder of files.
 
+use std::collections::BTreeSet;
 use std::io::{BufRead, IsTerminal, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde::Serialize;
 
 use crate::analysis::setup::setup_checks;
-use crate::campaign::draft::{self, Answers, Draft, Missing, Scan};
+use crate::campaign::draft::{self, Answers, Draft, FoundFrf, Guess, Missing, Scan};
 use crate::campaign::{Campaign, campaign_file};
-use crate::commands::begin::init_robot::{MadeRobot, RobotArgs};
+use crate::commands::begin::init_robot::{MadeRobot, RobotArgs, RobotMade};
 use crate::commands::text::{Emphasis, setup_lines, table, warnings};
 use crate::commands::{Outcome, next_step};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
@@ -292,20 +293,24 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
     notes.extend(passed_over);
 
     let guesses = draft.guesses();
-    let json = json!({
-        "dir": dir,
-        "file": file,
-        "complete": missing.is_empty(),
-        "frfs": scan.frfs.iter().map(|f| json!({ "file": f.path, "posture": f.posture, "nodes": f.nodes })).collect::<Vec<_>>(),
-        "cuts": scan.forces.iter().map(|f| json!({ "file": f.path })).collect::<Vec<_>>(),
-        "cut_list": list,
-        "missing": missing,
-        "guessed": guesses,
-        "setup": setup,
-        "warnings": notes,
-        "robot": made.map(MadeRobot::document),
-        "not_used": scan.not_used.iter().map(|(file, why)| json!({ "file": file, "why": why })).collect::<Vec<_>>(),
-    });
+    let document = Document {
+        dir,
+        file: &file,
+        complete: missing.is_empty(),
+        frfs: scan.frfs.iter().map(FrfTaken::of).collect(),
+        cuts: scan.forces.iter().map(|f| CutTaken { file: &f.path }).collect(),
+        cut_list: list.map(PathBuf::as_path),
+        missing: &missing,
+        guessed: &guesses,
+        setup: &setup,
+        warnings: &notes,
+        robot: made.map(RobotMade::of),
+        not_used: scan
+            .not_used
+            .iter()
+            .map(|(file, why)| FileNotUsed { file, why })
+            .collect(),
+    };
     let measured = match (scan.frfs.is_empty(), scan.forces.is_empty()) {
         (false, _) => next_step::Measured::Frfs,
         (true, false) => next_step::Measured::Forces,
@@ -314,10 +319,55 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
     let next = next_step::begun(dir, missing.len(), measured);
     let robot = made.map(MadeRobot::told).unwrap_or_default();
     Ok(Outcome::new(
-        json,
+        document,
         setup_lines(&setup) + &describe(&file, &scan, &draft, &missing, list, &notes) + &robot,
         Some(next),
     ))
+}
+
+/// What `init` wrote.
+#[derive(Serialize)]
+struct Document<'a> {
+    dir: &'a Path,
+    file: &'a Path,
+    complete: bool,
+    frfs: Vec<FrfTaken<'a>>,
+    cuts: Vec<CutTaken<'a>>,
+    cut_list: Option<&'a Path>,
+    missing: &'a [Missing],
+    guessed: &'a [Guess],
+    setup: &'a [SetupFinding],
+    warnings: &'a [String],
+    robot: Option<RobotMade<'a>>,
+    not_used: Vec<FileNotUsed<'a>>,
+}
+
+#[derive(Serialize)]
+struct FrfTaken<'a> {
+    file: &'a str,
+    posture: &'a str,
+    nodes: &'a BTreeSet<i64>,
+}
+
+impl<'a> FrfTaken<'a> {
+    fn of(frf: &'a FoundFrf) -> Self {
+        FrfTaken {
+            file: &frf.path,
+            posture: &frf.posture,
+            nodes: &frf.nodes,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct CutTaken<'a> {
+    file: &'a str,
+}
+
+#[derive(Serialize)]
+struct FileNotUsed<'a> {
+    file: &'a str,
+    why: &'a str,
 }
 
 fn nothing_found(args: &InitArgs, scan: &Scan) -> Error {

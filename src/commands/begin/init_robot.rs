@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::commands::text::Emphasis;
 use crate::files::{write_atomically, write_new};
@@ -151,18 +151,6 @@ impl MadeRobot {
         Ok(was_there)
     }
 
-    pub fn document(&self) -> Value {
-        json!({
-            "file": self.file,
-            "urdf": self.urdf,
-            "base_link": self.robot.base_link,
-            "tool_link": self.robot.tool_link,
-            "joints": self.robot.spec.joints.iter().map(|j| &j.name).collect::<Vec<_>>(),
-            "notes": self.robot.notes,
-            "guesses": self.robot.spec.guesses,
-        })
-    }
-
     /// For people.
     pub fn told(&self) -> String {
         let spec = &self.robot.spec;
@@ -180,5 +168,32 @@ impl MadeRobot {
             text += &format!("  {}: {guess}\n", Emphasis::Doubtful.on("guessed"));
         }
         text
+    }
+}
+
+/// The same for the document.
+#[derive(Serialize)]
+pub(crate) struct RobotMade<'a> {
+    file: &'a Path,
+    urdf: &'a Path,
+    base_link: &'a str,
+    tool_link: &'a str,
+    joints: Vec<Option<&'a str>>,
+    notes: &'a [String],
+    guesses: &'a [String],
+}
+
+impl<'a> RobotMade<'a> {
+    pub fn of(made: &'a MadeRobot) -> Self {
+        let spec = &made.robot.spec;
+        RobotMade {
+            file: &made.file,
+            urdf: &made.urdf,
+            base_link: &made.robot.base_link,
+            tool_link: &made.robot.tool_link,
+            joints: spec.joints.iter().map(|j| j.name.as_deref()).collect(),
+            notes: &made.robot.notes,
+            guesses: &spec.guesses,
+        }
     }
 }

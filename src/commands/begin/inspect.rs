@@ -1,14 +1,12 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::campaign::draft::measurement_files;
 use crate::commands::text::Emphasis;
 use crate::commands::{Outcome, next_step};
-use crate::ingest::{
-    self, Channel, ChannelRole, Dof, FrfRecord, MeasurementFile, Quantity, TimeRecord, units,
-};
+use crate::ingest::{self, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord, units};
 use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
@@ -21,9 +19,7 @@ pub struct InspectArgs {
 /// What can be read is told; a file that cannot is an error that names it, after what was told.
 pub fn run(args: InspectArgs) -> Result<Outcome> {
     let mut failures = Vec::new();
-    let mut files = Vec::new();
-    let mut text = String::new();
-    let mut kinds: Vec<(&Path, &'static str)> = Vec::new();
+    let mut files: Vec<FileSeen> = Vec::new();
     let mut paths = Vec::new();
     for path in args.files {
         match path.is_dir() {
@@ -33,11 +29,7 @@ pub fn run(args: InspectArgs) -> Result<Outcome> {
     }
     for path in &paths {
         match inspect(path) {
-            Ok(seen) => {
-                text.push_str(&seen.text());
-                files.push(seen.json());
-                kinds.push((path, seen.kind));
-            }
+            Ok(seen) => files.push(seen),
             Err(error) => failures.push(error),
         }
     }
@@ -56,15 +48,24 @@ pub fn run(args: InspectArgs) -> Result<Outcome> {
     };
     match failed {
         Some(failed) if files.is_empty() => Err(failed),
-        failed => Ok(Outcome {
-            failed,
-            ..Outcome::new(
-                json!({ "files": files, "unreadable": unreadable }),
+        failed => {
+            let text: String = files.iter().map(FileSeen::text).collect();
+            let kinds: Vec<(&Path, &'static str)> =
+                files.iter().map(|f| (f.path.as_path(), f.kind)).collect();
+            let next = next_step::inspected(&kinds);
+            Ok(Outcome {
+                failed,
                 // The blank line after the last file is that of the next step.
-                text.trim_end().to_string() + "\n",
-                Some(next_step::inspected(&kinds)),
-            )
-        }),
+                ..Outcome::new(
+                    Document {
+                        files: &files,
+                        unreadable,
+                    },
+                    text.trim_end().to_string() + "\n",
+                    Some(next),
+                )
+            })
+        }
     }
 }
 
@@ -80,21 +81,68 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
+/// What `inspect` saw.
+#[derive(Serialize)]
+struct Document<'a> {
+    files: &'a [FileSeen],
+    /// What is wrong with the others.
+    unreadable: Vec<String>,
+}
+
 /// A file and what it is for.
-struct Seen {
-    file: MeasurementFile,
+#[derive(Serialize)]
+struct FileSeen {
+    path: PathBuf,
+    format: String,
+    why: String,
     kind: &'static str,
-    rows: Vec<Row>,
+    channels: Vec<Row>,
     warnings: Vec<String>,
 }
 
-/// One channel or FRF, as JSON and as table cells.
+/// One channel or FRF, and its cells in the table.
+#[derive(Serialize)]
 struct Row {
-    json: Value,
+    #[serde(flatten)]
+    content: Content,
+    #[serde(skip)]
     cells: [String; 5],
 }
 
-fn inspect(path: &Path) -> Result<Seen> {
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Content {
+    Frf(FrfSeen),
+    Signal(SignalSeen),
+}
+
+#[derive(Serialize)]
+struct FrfSeen {
+    name: String,
+    response: Option<String>,
+    reference: Option<String>,
+    quantity: Option<&'static str>,
+    unit: Option<&'static str>,
+    role: &'static str,
+    lines: usize,
+    from_hz: Option<f64>,
+    to_hz: Option<f64>,
+    coherence: bool,
+}
+
+#[derive(Serialize)]
+struct SignalSeen {
+    name: String,
+    quantity: &'static str,
+    unit: String,
+    file_unit: String,
+    role: &'static str,
+    samples: usize,
+    sample_rate_hz: f64,
+    start_s: f64,
+}
+
+fn inspect(path: &Path) -> Result<FileSeen> {
     let survey = ingest::survey(path).map_err(|error| match error {
         Error::Input(error) => without_times(path, *error).into(),
         other => other,
@@ -134,10 +182,12 @@ fn inspect(path: &Path) -> Result<Seen> {
             contents.describe()
         ));
     }
-    Ok(Seen {
-        file,
+    Ok(FileSeen {
+        path: file.path,
+        format: file.format.to_string(),
+        why: file.why,
         kind,
-        rows,
+        channels: rows,
         warnings,
     })
 }
@@ -212,29 +262,18 @@ fn without_times(path: &Path, error: InputError) -> InputError {
     }
 }
 
-impl Seen {
-    fn json(&self) -> Value {
-        json!({
-            "path": self.file.path.display().to_string(),
-            "format": self.file.format.to_string(),
-            "why": self.file.why,
-            "kind": self.kind,
-            "channels": self.rows.iter().map(|r| &r.json).collect::<Vec<_>>(),
-            "warnings": self.warnings,
-        })
-    }
-
+impl FileSeen {
     fn text(&self) -> String {
         let mut text = format!(
             "{}\n  {} ({}): {}\n",
-            Emphasis::Strong.on(self.file.path.display()),
+            Emphasis::Strong.on(self.path.display()),
             self.kind,
-            self.file.format,
-            self.file.why
+            self.format,
+            self.why
         );
         let head = ["channel", "quantity", "unit", "role", "extent"].map(str::to_owned);
         let shown: Vec<&[String; 5]> = std::iter::once(&head)
-            .chain(self.rows.iter().map(|r| &r.cells))
+            .chain(self.channels.iter().map(|r| &r.cells))
             .collect();
         let width = |i: usize| {
             shown
@@ -279,17 +318,17 @@ fn frf_row(frf: &FrfRecord) -> Row {
         ""
     };
     Row {
-        json: json!({
-            "name": frf.name,
-            "response": dof(frf.response),
-            "reference": dof(frf.reference),
-            "quantity": quantity,
-            "unit": unit,
-            "role": "frf",
-            "lines": frf.frequency_hz.len(),
-            "from_hz": from,
-            "to_hz": to,
-            "coherence": frf.coherence.is_some(),
+        content: Content::Frf(FrfSeen {
+            name: frf.name.clone(),
+            response: dof(frf.response),
+            reference: dof(frf.reference),
+            quantity,
+            unit,
+            role: "frf",
+            lines: frf.frequency_hz.len(),
+            from_hz: from,
+            to_hz: to,
+            coherence: frf.coherence.is_some(),
         }),
         cells: [
             frf.name.clone(),
@@ -323,15 +362,15 @@ fn time_row(record: &TimeRecord, channel: &Channel, samples: usize) -> Row {
         (record.start_s * 1e6).round() / 1e6
     );
     Row {
-        json: json!({
-            "name": channel.name,
-            "quantity": quantity,
-            "unit": unit,
-            "file_unit": channel.file_unit,
-            "role": role,
-            "samples": samples,
-            "sample_rate_hz": record.sample_rate_hz,
-            "start_s": record.start_s,
+        content: Content::Signal(SignalSeen {
+            name: channel.name.clone(),
+            quantity,
+            unit: unit.to_owned(),
+            file_unit: channel.file_unit.clone(),
+            role,
+            samples,
+            sample_rate_hz: record.sample_rate_hz,
+            start_s: record.start_s,
         }),
         cells: [
             channel.name.clone(),

@@ -198,7 +198,7 @@ impl PageSubject for CampaignBench {
             "dir": self.dir,
             "stamp": stamp,
             "sides": sides,
-            "effects": explain::all(&robot),
+            "effects": explain::library(&robot),
             "report": found.report.is_some().then_some(found.drawn),
             "drawn_of": found.drawn_of,
             "problems": found.problems,

@@ -1,15 +1,20 @@
-use serde_json::json;
+use serde::Serialize;
 
 use crate::Result;
 use crate::analysis::{FreedLinks, StructureAnalysis};
 use crate::campaign::{Campaign, LinkGroup};
+use crate::commands::document::FitFound;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, files_first, percent, table, warnings_but};
 use crate::commands::{CampaignArg, Outcome};
+use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::comparison::place::DominantRegion;
+use crate::discrepancy::setup::SetupFinding;
+use crate::identify::frfs::modal_start::ModalStart;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
 use crate::report::number::{format_si, plus_minus};
 use crate::report::words::parameter_of;
+use crate::revision::Side;
 
 #[derive(clap::Args)]
 pub struct CalibrateArgs {
@@ -98,34 +103,20 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         Some(freed) => freed.undetermined.clone(),
         None => Undetermined::new(&case.model.parameters, calibration)?,
     };
-    let json = json!({
-        "domain": "structure",
-        "revision": case.revision(),
-        "effects": case.effects(),
-        "parameters": calibration.parameters,
-        "correlation": calibration.correlation(),
-        "error": after.totals,
-        "error_before": before.totals,
-        "iterations": calibration.iterations,
-        "converged": calibration.converged(),
-        "not_converged_because": calibration.ending.reason(),
-        "reduced_chi2": calibration.reduced_chi2,
-        "modal_start": start,
-        "starts": calibration.starts,
-        "starts_agreeing": calibration.starts_agreeing,
-        "undetermined": undetermined,
-        "freed": freed.as_ref().map(|freed| json!({
-            "groups": freed.groups.iter().map(|g| g.key()).collect::<Vec<_>>(),
-            "parameters_freed": freed.freed,
-            "departing": freed.departing,
-            "error_before": freed.before.after.totals,
-            "held_out_nrms_before": freed.held_out.as_ref().map(|[a, _]| a.nrms()),
-            "held_out_nrms_after": freed.held_out.as_ref().map(|[_, b]| b.nrms()),
-            "is_progress": freed.progress,
-        })),
-        "setup": setup.findings,
-        "warnings": notes,
-    });
+    let document = Document {
+        domain: Side::Structure,
+        revision: case.revision(),
+        effects: case.effects(),
+        fit: FitFound::of(calibration),
+        correlation: calibration.correlation(),
+        error: after.totals,
+        error_before: before.totals,
+        modal_start: start.as_ref(),
+        undetermined: &undetermined,
+        freed: freed.as_ref().map(WithFreed::of),
+        setup: &setup.findings,
+        warnings: notes,
+    };
     let mut text =
         files_first(&setup.findings, &case.warnings) + &format!("model: {}\n\n", case.model_description());
     text += &describe_parameters(&case.model, calibration);
@@ -170,7 +161,52 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         &after.totals,
         after.mostly.as_ref().map(DominantRegion::words),
     );
-    Ok(Outcome::new(json, text, Some(next)))
+    Ok(Outcome::new(document, text, Some(next)))
+}
+
+/// What `calibrate` found.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: Side,
+    revision: Option<usize>,
+    effects: Vec<String>,
+    #[serde(flatten)]
+    fit: FitFound<'a>,
+    correlation: Vec<Vec<Option<f64>>>,
+    error: ErrorTotals,
+    error_before: ErrorTotals,
+    modal_start: Option<&'a ModalStart>,
+    undetermined: &'a Undetermined,
+    freed: Option<WithFreed<'a>>,
+    setup: &'a [SetupFinding],
+    warnings: &'a [String],
+}
+
+/// With link parameters free.
+#[derive(Serialize)]
+struct WithFreed<'a> {
+    groups: Vec<&'static str>,
+    parameters_freed: usize,
+    departing: &'a [String],
+    error_before: ErrorTotals,
+    held_out_nrms_before: Option<f64>,
+    held_out_nrms_after: Option<f64>,
+    is_progress: Option<bool>,
+}
+
+impl<'a> WithFreed<'a> {
+    fn of(freed: &'a FreedLinks) -> Self {
+        let held_out = freed.held_out.as_ref();
+        WithFreed {
+            groups: freed.groups.iter().map(|g| g.key()).collect(),
+            parameters_freed: freed.freed,
+            departing: &freed.departing,
+            error_before: freed.before.after.totals,
+            held_out_nrms_before: held_out.map(|[before, _]| before.nrms()),
+            held_out_nrms_after: held_out.map(|[_, after]| after.nrms()),
+            is_progress: freed.progress,
+        }
+    }
 }
 
 /// What freeing link parameters did to the error, and how to keep it.

@@ -1,20 +1,27 @@
-use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use crate::Result;
-use crate::analysis::modes::mode_comparison::{ModePair, compare_modes, measured_modes};
+use crate::analysis::modes::mode_comparison::{FixedMode, ModePair, compare_modes, measured_modes};
 use crate::analysis::{CuttingAnalysis, ExpertView, StructureAnalysis};
 use crate::campaign::Campaign;
+use crate::commands::document::{Convergence, ErrorHeldOut, nrms_by_name};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{
     Emphasis, error_bar, files_first, number, percent, table, warnings, warnings_but, wrapped,
 };
 use crate::commands::{Outcome, SideArgs, by_domain};
-use crate::discrepancy::comparison::compare::{ErrorMap, GroupError};
-use crate::discrepancy::comparison::compare_cutting::HarmonicError;
+use crate::data::Process;
+use crate::discrepancy::comparison::compare::{Band, ErrorMap, GroupError};
+use crate::discrepancy::comparison::compare_cutting::{CutError, HarmonicError};
+use crate::discrepancy::comparison::locate::Location;
 use crate::discrepancy::comparison::place::DominantRegion;
+use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::{FrfComparison, FrfError};
 use crate::identify::frfs::structure_study::{ResidualPeak, held_out_postures, residual_peaks};
-use crate::identify::{Options, StructureCase};
+use crate::identify::{Estimate, Options, StructureCase};
+use crate::revision::Side;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
@@ -25,33 +32,62 @@ fn cutting(campaign: &Campaign) -> Result<Outcome> {
     let analysis = CuttingAnalysis::run(campaign)?;
     let setup = analysis.setup_check()?;
     let c = &analysis.comparison;
-    let mut error = json!(c.totals);
-    error["held_out_nrms"] = json!(analysis.held_out_nrms);
-    let json = json!({
-        "domain": "cutting",
-        "process": analysis.data.process,
-        "error": error,
-        "by_cut": object(&c.by_cut),
-        "by_axis": object(&c.by_axis),
-        "by_speed": object(&c.by_speed),
-        "by_feed": object(&c.by_feed),
-        "by_order": object(&c.by_order),
-        "by_harmonic": c.by_harmonic,
-        "cuts": c.cuts,
-        "mostly": c.mostly,
-        "parameters": analysis.calibration.parameters,
-        "chi2_per_value": analysis.calibration.reduced_chi2,
-        "setup": setup.findings,
-        "converged": analysis.calibration.converged(),
-        "not_converged_because": analysis.calibration.ending.reason(),
-        "warnings": analysis.noticed.iter().chain(&analysis.warnings).collect::<Vec<_>>(),
-    });
     let next =
         Guide::cutting(campaign).compared(analysis.calibration.reduced_chi2, &c.totals, c.mostly.clone());
     let text = files_first(&setup.findings, &analysis.noticed)
         + &describe_cutting(&analysis)
         + &warnings(&analysis.warnings);
-    Ok(Outcome::new(json, text, Some(next)))
+    let document = CuttingDocument::new(&analysis, &setup.findings);
+    Ok(Outcome::new(document, text, Some(next)))
+}
+
+/// What `compare` found about force records.
+#[derive(Serialize)]
+struct CuttingDocument<'a> {
+    domain: Side,
+    process: Process,
+    error: ErrorHeldOut,
+    by_cut: BTreeMap<&'a str, f64>,
+    by_axis: BTreeMap<&'a str, f64>,
+    by_speed: BTreeMap<&'a str, f64>,
+    by_feed: BTreeMap<&'a str, f64>,
+    by_order: BTreeMap<&'a str, f64>,
+    by_harmonic: &'a [HarmonicError],
+    cuts: &'a [CutError],
+    mostly: Option<&'a str>,
+    parameters: &'a [Estimate],
+    chi2_per_value: f64,
+    setup: &'a [SetupFinding],
+    #[serde(flatten)]
+    convergence: Convergence,
+    warnings: Vec<&'a String>,
+}
+
+impl<'a> CuttingDocument<'a> {
+    fn new(analysis: &'a CuttingAnalysis, setup: &'a [SetupFinding]) -> Self {
+        let (c, calibration) = (&analysis.comparison, &analysis.calibration);
+        CuttingDocument {
+            domain: Side::Cutting,
+            process: analysis.data.process,
+            error: ErrorHeldOut {
+                totals: c.totals,
+                held_out_nrms: analysis.held_out_nrms,
+            },
+            by_cut: nrms_by_name(&c.by_cut),
+            by_axis: nrms_by_name(&c.by_axis),
+            by_speed: nrms_by_name(&c.by_speed),
+            by_feed: nrms_by_name(&c.by_feed),
+            by_order: nrms_by_name(&c.by_order),
+            by_harmonic: &c.by_harmonic,
+            cuts: &c.cuts,
+            mostly: c.mostly.as_deref(),
+            parameters: &calibration.parameters,
+            chi2_per_value: calibration.reduced_chi2,
+            setup,
+            convergence: Convergence::of(calibration),
+            warnings: analysis.noticed.iter().chain(&analysis.warnings).collect(),
+        }
+    }
 }
 
 fn describe_cutting(analysis: &CuttingAnalysis) -> String {
@@ -116,8 +152,6 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
     } = &analysis;
     let setup = analysis.setup_check()?;
     let held_out = held_out_postures(&case.model, &case.data, &calibration.theta)?.map(|h| h.nrms());
-    let mut error = json!(comparison.totals);
-    error["held_out_nrms"] = json!(held_out);
     let peaks = residual_peaks(&analysis.calibrated, &case.data);
     let mut notes = notes.clone();
     // Modes are an addition: FRFs that show none are compared all the same.
@@ -132,30 +166,37 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         &analysis.calibrated,
         &modes,
     )?;
-    let json = json!({
-        "domain": "structure",
-        "revision": case.revision(),
-        "effects": case.effects(),
-        "error": error,
-        "by_posture": object(&comparison.by_posture),
-        "by_direction": object(&comparison.by_direction),
-        "by_point": object(&comparison.by_point),
-        "by_band": comparison.by_band,
-        "map": comparison.map,
-        "modes": modes.pairs.iter().map(mode).collect::<Vec<_>>(),
-        "fixed_modes": expert.fixed_modes,
-        "located": expert.located,
-        "stands_out": expert.sentences(),
-        "frfs": comparison.frf_errors.iter().map(frf_form).collect::<Vec<_>>(),
-        "mostly": comparison.mostly,
-        "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
-        "residual_peaks": peaks,
-        "worst_frfs": comparison.worst_first().iter().take(10).map(|&i| frf(&comparison.frf_errors[i])).collect::<Vec<_>>(),
-        "setup": setup.findings,
-        "converged": calibration.converged(),
-        "not_converged_because": calibration.ending.reason(),
-        "warnings": notes,
-    });
+    let document = StructureDocument {
+        domain: Side::Structure,
+        revision: case.revision(),
+        effects: case.effects(),
+        error: ErrorHeldOut {
+            totals: comparison.totals,
+            held_out_nrms: held_out,
+        },
+        by_posture: nrms_by_name(&comparison.by_posture),
+        by_direction: nrms_by_name(&comparison.by_direction),
+        by_point: nrms_by_name(&comparison.by_point),
+        by_band: &comparison.by_band,
+        map: &comparison.map,
+        modes: modes.pairs.iter().map(ModeCompared::of).collect(),
+        fixed_modes: &expert.fixed_modes,
+        located: &expert.located,
+        stands_out: expert.sentences(),
+        frfs: comparison.frf_errors.iter().map(FrfForm::of).collect(),
+        mostly: comparison.mostly.as_ref(),
+        residual_peaks_hz: peaks.iter().map(|p| p.frequency_hz).collect(),
+        residual_peaks: &peaks,
+        worst_frfs: comparison
+            .worst_first()
+            .iter()
+            .take(WORST_TOLD)
+            .map(|&i| FrfWithNoise::of(&comparison.frf_errors[i]))
+            .collect(),
+        setup: &setup.findings,
+        convergence: Convergence::of(calibration),
+        warnings: &notes,
+    };
     let next = Guide::structure(campaign).compared(
         calibration.reduced_chi2,
         &comparison.totals,
@@ -167,7 +208,34 @@ fn structure(campaign: &Campaign) -> Result<Outcome> {
         + &describe(comparison, held_out, &peaks)
         + &mode_table(&modes.pairs)
         + &warnings_but(&notes, &case.warnings);
-    Ok(Outcome::new(json, text, Some(next)))
+    Ok(Outcome::new(document, text, Some(next)))
+}
+
+/// What `compare` found about FRFs.
+#[derive(Serialize)]
+struct StructureDocument<'a> {
+    domain: Side,
+    revision: Option<usize>,
+    effects: Vec<String>,
+    error: ErrorHeldOut,
+    by_posture: BTreeMap<&'a str, f64>,
+    by_direction: BTreeMap<&'a str, f64>,
+    by_point: BTreeMap<&'a str, f64>,
+    by_band: &'a [Band],
+    map: &'a ErrorMap,
+    modes: Vec<ModeCompared<'a>>,
+    fixed_modes: &'a [FixedMode],
+    located: &'a [Location],
+    stands_out: Vec<String>,
+    frfs: Vec<FrfForm<'a>>,
+    mostly: Option<&'a DominantRegion>,
+    residual_peaks_hz: Vec<f64>,
+    residual_peaks: &'a [ResidualPeak],
+    worst_frfs: Vec<FrfWithNoise<'a>>,
+    setup: &'a [SetupFinding],
+    #[serde(flatten)]
+    convergence: Convergence,
+    warnings: &'a [String],
 }
 
 /// What stands out to an expert's eye, a line each.
@@ -175,39 +243,62 @@ pub fn stands_out(expert: &ExpertView) -> String {
     expert.sentences().iter().map(|s| wrapped(s, "  ")).collect()
 }
 
-fn mode(pair: &ModePair) -> Value {
-    let mut json = json!(pair);
-    json["frequency_error"] = json!(pair.frequency_error());
-    json["damping_error"] = json!(pair.damping_error());
-    json
+/// A pair of modes; errors are model over measured less 1.
+#[derive(Serialize)]
+struct ModeCompared<'a> {
+    #[serde(flatten)]
+    pair: &'a ModePair,
+    frequency_error: Option<f64>,
+    damping_error: Option<f64>,
 }
 
-fn frf_form(error: &FrfError) -> Value {
-    json!({
-        "name": error.name,
-        "posture": error.posture,
-        "frac": error.frac,
-        "nrms": error.nrms,
-        "times_noise": error.times_noise(),
-    })
+impl<'a> ModeCompared<'a> {
+    fn of(pair: &'a ModePair) -> Self {
+        ModeCompared {
+            pair,
+            frequency_error: pair.frequency_error(),
+            damping_error: pair.damping_error(),
+        }
+    }
 }
 
-fn frf(error: &FrfError) -> Value {
-    json!({
-        "name": error.name,
-        "posture": error.posture,
-        "direction": error.direction,
-        "nrms": error.nrms,
-        "noise_floor_nrms": error.noise_floor_nrms,
-        "times_noise": error.times_noise(),
-        "frac": error.frac,
-        "worst_line": error.worst_line,
-    })
+/// An FRF in short.
+#[derive(Serialize)]
+struct FrfForm<'a> {
+    name: &'a str,
+    posture: &'a str,
+    frac: Option<f64>,
+    nrms: f64,
+    times_noise: f64,
 }
 
-fn object(groups: &[GroupError]) -> Value {
-    let map: Map<String, Value> = groups.iter().map(|g| (g.name.clone(), json!(g.nrms))).collect();
-    map.into()
+impl<'a> FrfForm<'a> {
+    fn of(error: &'a FrfError) -> Self {
+        FrfForm {
+            name: &error.name,
+            posture: &error.posture,
+            frac: error.frac,
+            nrms: error.nrms,
+            times_noise: error.times_noise(),
+        }
+    }
+}
+
+/// An FRF with all that is known of its error.
+#[derive(Serialize)]
+struct FrfWithNoise<'a> {
+    #[serde(flatten)]
+    error: &'a FrfError,
+    times_noise: f64,
+}
+
+impl<'a> FrfWithNoise<'a> {
+    fn of(error: &'a FrfError) -> Self {
+        FrfWithNoise {
+            error,
+            times_noise: error.times_noise(),
+        }
+    }
 }
 
 /// A table with bars for each kind of group.
@@ -371,6 +462,8 @@ fn grid(map: &ErrorMap) -> String {
     text
 }
 
+/// The worst FRFs in the document.
+const WORST_TOLD: usize = 10;
 /// FRFs in the table of the worst.
 const WORST_SHOWN: usize = 5;
 

@@ -1,22 +1,28 @@
-use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use crate::Result;
 use crate::analysis::{CampaignSide, CuttingFindings, DiagnosisFindings, Findings, Workbench, WrongLinks};
 use crate::campaign::Campaign;
-use crate::commands::find::localise;
+use crate::commands::document::EffectBarred;
+use crate::commands::find::localise::{self, PlaceDrawn};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, files_first, number, percent, table, wrapped};
 use crate::commands::{Outcome, SideArgs, by_domain};
+use crate::data::Process;
 use crate::discrepancy::candidate::BaselineFit;
-use crate::discrepancy::comparison::explained::{Explained, NamedPart};
-use crate::discrepancy::joint_trends::JointTrends;
+use crate::discrepancy::comparison::explained::Explained;
+use crate::discrepancy::joint_trends::{JointCourse, JointTrend, JointTrends};
 use crate::discrepancy::localise::Localisation;
+use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, Trend};
-use crate::identify::Modelled;
-use crate::identify::Options;
-use crate::identify::frfs::structure_study::residual_peaks;
+use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
+use crate::identify::rest::{BeyondSlips, RestTest};
+use crate::identify::{Estimate, HeldOut, Modelled, Options};
 use crate::report::verdict_card::departure;
 use crate::report::words;
+use crate::revision::Side;
 use crate::text::chance;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -40,10 +46,10 @@ fn diagnosed<D: CampaignSide>(campaign: &Campaign) -> Result<Findings<D>> {
 
 /// What was found out about the force records.
 pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
-    let own = json!({
-        "process": findings.case.data.process,
-        "lead": findings.lead,
-    });
+    let own = CuttingKeys {
+        process: findings.case.data.process,
+        lead: findings.lead.as_ref(),
+    };
     let told = findings.lead.as_ref().map_or(String::new(), lines_in_words);
     outcome(Guide::cutting(campaign), findings, own, &told, None)
 }
@@ -51,16 +57,20 @@ pub fn cutting(campaign: &Campaign, findings: &CuttingFindings) -> Outcome {
 /// What was found out about the FRFs.
 pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
     let peaks = &residual_peaks(&findings.now.predicted, &findings.case.data);
-    let own = json!({
-        "explains": explains(findings),
-        "residual_peaks_hz": peaks.iter().map(|p| p.frequency_hz).collect::<Vec<_>>(),
-        "residual_peaks": peaks,
-        "lead": findings.lead.as_ref().and_then(|l| l.place.as_ref()).map(lead),
-        "wrong_links": wrong_links(findings),
-        "joint_trends": joint_trends(findings).map_or(&[][..], |j| j.trends.as_slice()),
-        "joint_courses": joint_trends(findings).map_or(&[][..], |j| j.courses.as_slice()),
-    });
-    let told = joint_trends(findings).map_or(String::new(), joints_in_words)
+    let joints = joint_trends(findings);
+    let own = StructureKeys {
+        explains: Explains::of(findings),
+        residual_peaks_hz: peaks.iter().map(|p| p.frequency_hz).collect(),
+        residual_peaks: peaks,
+        // The best place of what the data draw.
+        lead: place_drawn(findings)
+            .and_then(|found| found.places.first())
+            .map(PlaceDrawn::of),
+        wrong_links: wrong_links(findings),
+        joint_trends: joints.map_or(&[], |j| &j.trends),
+        joint_courses: joints.map_or(&[], |j| &j.courses),
+    };
+    let told = joints.map_or(String::new(), joints_in_words)
         + &crate::commands::find::compare::dominant(peaks)
         + &where_it_shows(findings);
     let guide = Guide::structure(campaign);
@@ -70,6 +80,10 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
 
 fn wrong_links(findings: &DiagnosisFindings) -> Option<&WrongLinks> {
     findings.lead.as_ref()?.links.as_ref()
+}
+
+fn place_drawn(findings: &DiagnosisFindings) -> Option<&Localisation> {
+    findings.lead.as_ref()?.place.as_ref()
 }
 
 fn joint_trends(findings: &DiagnosisFindings) -> Option<&JointTrends> {
@@ -104,7 +118,7 @@ fn joints_in_words(joints: &JointTrends) -> String {
 fn outcome<D: CampaignSide>(
     guide: Guide<'_>,
     findings: &Findings<D>,
-    own: Value,
+    own: impl Serialize,
     told: &str,
     instead: Option<String>,
 ) -> Outcome {
@@ -116,33 +130,6 @@ fn outcome<D: CampaignSide>(
         ..
     } = findings;
     let noise_floor_nrms = D::totals(&findings.now).noise_floor_nrms;
-    let mut json = json!({
-        "domain": D::SIDE,
-        "revision": case.revision(),
-        "effects": case.effects(),
-        "verdict": d.verdict,
-        "effect": d.winner().map(|c| &c.name.effect),
-        "site": d.winner().and_then(|c| c.name.site.as_ref()),
-        "confidence": d.confidence,
-        "too_little_data": d.too_little_data,
-        "pairs": d.pairs.map(|[tried, of]| json!({ "tried": tried, "of": of })),
-        "companion": d.companions.first(),
-        "companions": d.companions,
-        "best_guess": d.best_guess.map(|i| d.candidates[i].label()),
-        "explained_share": explained_share(d).map(|[share, _]| share),
-        "explained_share_std_error": explained_share(d).map(|[_, std]| std),
-        "rest": left_over(d),
-        "candidates": d.candidates.iter().map(candidate).collect::<Vec<_>>(),
-        "indistinguishable": d.indistinguishable,
-        "next_measurement": next_measurement,
-        "baseline": baseline(&d.baseline, noise_floor_nrms),
-        "not_tried": d.not_tried.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
-        "setup": setup.findings,
-        "warnings": case.warnings,
-    });
-    if let (Some(all), Value::Object(own)) = (json.as_object_mut(), own) {
-        all.extend(own);
-    }
     let text = files_first(&setup.findings, &case.warnings)
         + &format!("model: {}\n", case.model_description())
         + &as_it_stands(&d.baseline, noise_floor_nrms)
@@ -152,7 +139,258 @@ fn outcome<D: CampaignSide>(
     let winner = d.winner().map(EffectCandidate::label);
     let next =
         instead.unwrap_or_else(|| guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what));
-    Outcome::new(json, text, Some(next))
+    Outcome::new(Document::new(findings, own), text, Some(next))
+}
+
+/// What `diagnose` found; `own`: keys of one side alone.
+#[derive(Serialize)]
+struct Document<'a, Own> {
+    domain: Side,
+    revision: Option<usize>,
+    effects: Vec<String>,
+    verdict: DiagnosisVerdict,
+    effect: Option<&'a str>,
+    site: Option<&'a str>,
+    confidence: f64,
+    too_little_data: Option<&'a str>,
+    pairs: Option<PairsTried>,
+    companion: Option<&'a str>,
+    companions: &'a [String],
+    best_guess: Option<String>,
+    explained_share: Option<f64>,
+    explained_share_std_error: Option<f64>,
+    rest: RestLeft<'a>,
+    candidates: Vec<Candidate<'a>>,
+    indistinguishable: &'a [String],
+    next_measurement: &'a NextMeasurement,
+    baseline: Baseline,
+    not_tried: Vec<EffectBarred<'a>>,
+    setup: &'a [SetupFinding],
+    warnings: &'a [String],
+    #[serde(flatten)]
+    own: Own,
+}
+
+impl<'a, Own> Document<'a, Own> {
+    fn new<D: CampaignSide>(findings: &'a Findings<D>, own: Own) -> Self {
+        let (case, d) = (&findings.case, &findings.diagnosis);
+        let winner = d.winner().map(|c| &c.name);
+        let [share, share_std_error] = explained_share(d).map_or([None; 2], |of| of.map(Some));
+        Document {
+            domain: D::SIDE,
+            revision: case.revision(),
+            effects: case.effects(),
+            verdict: d.verdict,
+            effect: winner.map(|name| name.effect.as_str()),
+            site: winner.and_then(|name| name.site.as_deref()),
+            confidence: d.confidence,
+            too_little_data: d.too_little_data.as_deref(),
+            pairs: d.pairs.map(|[tried, of]| PairsTried { tried, of }),
+            companion: d.companions.first().map(String::as_str),
+            companions: &d.companions,
+            best_guess: d.best_guess.map(|i| d.candidates[i].label()),
+            explained_share: share,
+            explained_share_std_error: share_std_error,
+            rest: RestLeft::of(d),
+            candidates: d.candidates.iter().map(Candidate::of).collect(),
+            indistinguishable: &d.indistinguishable,
+            next_measurement: &findings.next_measurement,
+            baseline: Baseline::of(&d.baseline, D::totals(&findings.now).noise_floor_nrms),
+            not_tried: EffectBarred::all(&d.not_tried),
+            setup: &findings.setup.findings,
+            warnings: &case.warnings,
+            own,
+        }
+    }
+}
+
+/// Pairs of effects that were looked at, of how many.
+#[derive(Serialize)]
+struct PairsTried {
+    tried: usize,
+    of: usize,
+}
+
+#[derive(Serialize)]
+struct CuttingKeys<'a> {
+    process: Process,
+    lead: Option<&'a CuttingLead>,
+}
+
+#[derive(Serialize)]
+struct StructureKeys<'a> {
+    explains: Option<Explains<'a>>,
+    residual_peaks_hz: Vec<f64>,
+    residual_peaks: &'a [ResidualPeak],
+    lead: Option<PlaceDrawn<'a>>,
+    wrong_links: Option<&'a WrongLinks>,
+    joint_trends: &'a [JointTrend],
+    joint_courses: &'a [JointCourse],
+}
+
+/// What the missing effect (the leading candidate where none explains the rest) takes away of the residual, and where.
+#[derive(Serialize)]
+struct Explains<'a> {
+    effect: &'a str,
+    site: Option<&'a str>,
+    #[serde(flatten)]
+    explained: &'a Explained,
+}
+
+impl<'a> Explains<'a> {
+    fn of(findings: &'a DiagnosisFindings) -> Option<Self> {
+        let name = &findings.leader()?.name;
+        Some(Explains {
+            effect: &name.effect,
+            site: name.site.as_deref(),
+            explained: &findings.leading.as_ref()?.explained,
+        })
+    }
+}
+
+/// The model as it stands.
+#[derive(Serialize)]
+struct Baseline {
+    nrms: f64,
+    held_out_nrms: Option<f64>,
+    noise_floor_nrms: f64,
+    reduced_chi2: f64,
+    independent_share: f64,
+}
+
+impl Baseline {
+    fn of(b: &BaselineFit, noise_floor_nrms: f64) -> Self {
+        Baseline {
+            nrms: b.residual.nrms,
+            held_out_nrms: b.held_out.as_ref().map(HeldOut::nrms),
+            noise_floor_nrms,
+            reduced_chi2: b.reduced_chi2,
+            independent_share: b.residual.independent_share,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Candidate<'a> {
+    effect: &'a str,
+    site: Option<&'a str>,
+    nrms: f64,
+    held_out_nrms: Option<f64>,
+    delta_bic: f64,
+    p_value: f64,
+    reduced_chi2: f64,
+    at_bound: bool,
+    not_credible: Option<&'a str>,
+    explained_share: Option<f64>,
+    vanished: bool,
+    refined: bool,
+    parameters: BTreeMap<&'a str, ParameterValue<'a>>,
+    parameter_std_errors: Vec<ParameterError<'a>>,
+}
+
+impl<'a> Candidate<'a> {
+    fn of<D: Modelled>(c: &'a EffectCandidate<D>) -> Self {
+        Candidate {
+            effect: &c.name.effect,
+            site: c.name.site.as_deref(),
+            nrms: c.nrms,
+            held_out_nrms: c.held_out.as_ref().map(HeldOut::nrms),
+            delta_bic: c.delta_bic,
+            p_value: c.p_value,
+            reduced_chi2: c.reduced_chi2,
+            at_bound: c.at_bound,
+            not_credible: c.not_credible.as_deref(),
+            explained_share: c.explained_share().map(|[share, _]| share),
+            vanished: c.vanished,
+            refined: c.refined,
+            parameters: parameters(c),
+            parameter_std_errors: c.parameters.iter().map(ParameterError::of).collect(),
+        }
+    }
+}
+
+/// A parameter of an effect, in its own unit.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum ParameterValue<'a> {
+    One(f64),
+    List(Vec<f64>),
+    Choice(&'a str),
+}
+
+#[derive(Serialize)]
+struct ParameterError<'a> {
+    name: &'a str,
+    value: f64,
+    std_error: f64,
+    unit: &'a str,
+}
+
+impl<'a> ParameterError<'a> {
+    fn of(p: &'a Estimate) -> Self {
+        ParameterError {
+            name: &p.name,
+            value: p.value,
+            std_error: p.std_error,
+            unit: p.unit,
+        }
+    }
+}
+
+/// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
+fn parameters<D: Modelled>(candidate: &EffectCandidate<D>) -> BTreeMap<&str, ParameterValue<'_>> {
+    let mut map = BTreeMap::new();
+    for p in &candidate.parameters {
+        let key = p.name.rsplit('.').next().unwrap_or(&p.name);
+        match key.split_once('[') {
+            Some((list, _)) => {
+                let entry = map
+                    .entry(list)
+                    .or_insert_with(|| ParameterValue::List(Vec::new()));
+                if let ParameterValue::List(values) = entry {
+                    values.push(p.value);
+                }
+            }
+            None => {
+                map.insert(key, ParameterValue::One(p.value));
+            }
+        }
+    }
+    if let Some((key, value)) = &candidate.name.variant {
+        map.insert(key, ParameterValue::Choice(value));
+    }
+    map
+}
+
+/// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
+#[derive(Serialize)]
+struct RestLeft<'a> {
+    significant: bool,
+    share: Option<f64>,
+    looks_like: Option<&'static str>,
+    small_errors_share: Option<f64>,
+    small_errors: f64,
+    beyond_small_errors: Option<&'a BeyondSlips>,
+    tests: &'a [RestTest],
+}
+
+impl<'a> RestLeft<'a> {
+    fn of<D: Modelled>(d: &'a Diagnosis<D>) -> Self {
+        let (rest, gain) = match spoken_of(d).and_then(|c| Some((c.rest.as_ref()?, c.gain))) {
+            Some((rest, gain)) => (rest, gain),
+            None => (&d.baseline.rest, 0.0),
+        };
+        let largest = rest.largest();
+        RestLeft {
+            significant: rest.is_significant(),
+            share: largest.map(|t| t.excess / (t.excess + gain.max(0.0))),
+            looks_like: largest.map(|t| t.looks_like),
+            small_errors_share: rest.share_of_slips(),
+            small_errors: rest.small_errors,
+            beyond_small_errors: rest.beyond_slips.as_ref(),
+            tests: &rest.tests,
+        }
+    }
 }
 
 /// What is left by what it follows, and what usually causes that: what differed between the cuts and within them, then the lines.
@@ -217,58 +455,6 @@ fn trends_in_words(trends: &[Trend]) -> String {
     text
 }
 
-fn baseline(b: &BaselineFit, noise_floor_nrms: f64) -> Value {
-    json!({
-        "nrms": b.residual.nrms,
-        "held_out_nrms": b.held_out.as_ref().map(|h| h.nrms()),
-        "noise_floor_nrms": noise_floor_nrms,
-        "reduced_chi2": b.reduced_chi2,
-        "independent_share": b.residual.independent_share,
-    })
-}
-
-/// The effect's own parameters by the keys of docs/json.md; `name[0]`, `name[1]`, … become one list.
-fn parameters<D: Modelled>(candidate: &EffectCandidate<D>) -> Value {
-    let mut map = Map::new();
-    for p in &candidate.parameters {
-        let key = p.name.rsplit('.').next().unwrap_or(&p.name);
-        match key.split_once('[') {
-            Some((list, _)) => {
-                let entry = map.entry(list.to_string()).or_insert_with(|| json!([]));
-                if let Some(values) = entry.as_array_mut() {
-                    values.push(json!(p.value));
-                }
-            }
-            None => {
-                map.insert(key.to_string(), json!(p.value));
-            }
-        }
-    }
-    if let Some((key, value)) = &candidate.name.variant {
-        map.insert(key.clone(), json!(value));
-    }
-    map.into()
-}
-
-fn candidate<D: Modelled>(c: &EffectCandidate<D>) -> Value {
-    json!({
-        "effect": c.name.effect,
-        "site": c.name.site,
-        "nrms": c.nrms,
-        "held_out_nrms": c.held_out.as_ref().map(|h| h.nrms()),
-        "delta_bic": c.delta_bic,
-        "p_value": c.p_value,
-        "reduced_chi2": c.reduced_chi2,
-        "at_bound": c.at_bound,
-        "not_credible": c.not_credible,
-        "explained_share": c.explained_share().map(|[share, _]| share),
-        "vanished": c.vanished,
-        "refined": c.refined,
-        "parameters": parameters(c),
-        "parameter_std_errors": c.parameters.iter().map(|p| json!({ "name": p.name, "value": p.value, "std_error": p.std_error, "unit": p.unit })).collect::<Vec<_>>(),
-    })
-}
-
 /// The candidate that the verdict names, or the best of the library where it names none.
 fn spoken_of<D: Modelled>(d: &Diagnosis<D>) -> Option<&EffectCandidate<D>> {
     let candidate = d.effect.or(d.best_guess)?;
@@ -282,58 +468,10 @@ fn explained_share<D: Modelled>(d: &Diagnosis<D>) -> Option<[f64; 2]> {
         .and_then(EffectCandidate::explained_share)
 }
 
-/// What is left: of the best candidate, of the model as it stands where nothing is said to be missing.
-fn left_over<D: Modelled>(d: &Diagnosis<D>) -> Value {
-    let (rest, gain) = match spoken_of(d).and_then(|c| Some((c.rest.as_ref()?, c.gain))) {
-        Some((rest, gain)) => (rest, gain),
-        None => (&d.baseline.rest, 0.0),
-    };
-    let largest = rest.largest();
-    json!({
-        "significant": rest.is_significant(),
-        "share": largest.map(|t| t.excess / (t.excess + gain.max(0.0))),
-        "looks_like": largest.map(|t| t.looks_like),
-        "small_errors_share": rest.share_of_slips(),
-        "small_errors": rest.small_errors,
-        "beyond_small_errors": rest.beyond_slips,
-        "tests": rest.tests,
-    })
-}
-
 /// Groups of lines with less than this share of what stands above the noise are in the JSON only.
 const SMALLEST_SHARE: f64 = 0.01;
 /// Candidates shown to a person; all are in the JSON.
 const SHOWN: usize = 8;
-
-/// What the missing effect (the leading candidate where none explains the rest) takes away of the residual, and where.
-fn explains(findings: &DiagnosisFindings) -> Value {
-    let (Some(leading), Some(candidate)) = (&findings.leading, findings.leader()) else {
-        return Value::Null;
-    };
-    let Explained {
-        total,
-        by_posture,
-        by_direction,
-        by_point,
-        by_band,
-        taken_from,
-        left_at,
-    } = &leading.explained;
-    let object = |parts: &[NamedPart]| -> Value {
-        let map: Map<String, Value> = parts.iter().map(|p| (p.name.clone(), json!(p.part))).collect();
-        map.into()
-    };
-    let mut json = json!(total);
-    json["effect"] = json!(candidate.name.effect);
-    json["site"] = json!(candidate.name.site);
-    json["by_posture"] = object(by_posture);
-    json["by_direction"] = object(by_direction);
-    json["by_point"] = object(by_point);
-    json["by_band"] = json!(by_band);
-    json["taken_from"] = json!(taken_from);
-    json["left_at"] = json!(left_at);
-    json
-}
 
 /// What the best candidate takes away, and where; and what the data draw where there is no name for it.
 fn where_it_shows(findings: &DiagnosisFindings) -> String {
@@ -348,7 +486,7 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
     if let Some(found) = wrong_links(findings) {
         text += &wrapped(&wrong_links_in_words(found), "  ");
     }
-    if let Some(found) = findings.lead.as_ref().and_then(|l| l.place.as_ref()) {
+    if let Some(found) = place_drawn(findings) {
         text += &wrapped(
             &format!(
                 "A lead: {}. `lobestone localise` draws it.",
@@ -372,11 +510,6 @@ fn wrong_links_in_words(found: &WrongLinks) -> String {
             .join(", "),
         found.reduced_chi2
     )
-}
-
-/// The best place of what the data draw.
-fn lead(found: &Localisation) -> Value {
-    found.places.first().map_or(Value::Null, localise::place)
 }
 
 fn as_it_stands(baseline: &BaselineFit, noise_floor_nrms: f64) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::commands::Outcome;
 use crate::commands::text::{Emphasis, wrapped};
@@ -17,19 +17,23 @@ pub struct ExplainArgs {
     effect: Option<String>,
 }
 
-/// An effect as a reader meets it.
-struct Entry {
+/// An effect as a reader meets it: what it is, how it shows, how to check it.
+#[derive(Serialize)]
+pub(crate) struct EffectExplained {
     domain: &'static str,
+    #[serde(rename = "effect")]
     id: &'static str,
     explanation: &'static str,
     fingerprint: &'static str,
+    #[serde(flatten)]
     background: Background,
     /// On the built-in robot; empty where it has no place of its own.
     sites: Vec<String>,
 }
 
-fn library(robot: &RobotSpec) -> Vec<Entry> {
-    let structural = STRUCTURAL.into_iter().map(|e| Entry {
+/// Every effect.
+pub(crate) fn library(robot: &RobotSpec) -> Vec<EffectExplained> {
+    let structural = STRUCTURAL.into_iter().map(|e| EffectExplained {
         domain: "structure",
         id: e.id(),
         explanation: e.explanation(),
@@ -37,7 +41,7 @@ fn library(robot: &RobotSpec) -> Vec<Entry> {
         background: e.background(),
         sites: e.sites(robot).into_iter().filter_map(|s| s.label()).collect(),
     });
-    let cutting = CUTTING.into_iter().map(|e| Entry {
+    let cutting = CUTTING.into_iter().map(|e| EffectExplained {
         domain: "cutting",
         id: e.id(),
         explanation: e.explanation(),
@@ -48,16 +52,16 @@ fn library(robot: &RobotSpec) -> Vec<Entry> {
     structural.chain(cutting).collect()
 }
 
-/// Every effect: what it is, how it shows, how to check it.
-pub fn all(robot: &RobotSpec) -> Value {
-    library(robot).iter().map(Entry::json).collect()
+#[derive(Serialize)]
+struct Library<'a> {
+    effects: &'a [EffectExplained],
 }
 
 pub fn run(args: ExplainArgs) -> Result<Outcome> {
     let library = library(&RobotSpec::load("irb6640", Path::new(""))?);
     let Some(name) = args.effect else {
         return Ok(Outcome::new(
-            json!({ "effects": library.iter().map(Entry::json).collect::<Vec<_>>() }),
+            Library { effects: &library },
             list(&library),
             Some("run `lobestone explain EFFECT` for one of them".into()),
         ));
@@ -65,7 +69,7 @@ pub fn run(args: ExplainArgs) -> Result<Outcome> {
     // As diagnose writes it, with its site.
     let id = name.split('@').next().unwrap_or(&name).to_lowercase();
     match library.iter().find(|e| e.id == id) {
-        Some(entry) => Ok(Outcome::new(entry.json(), entry.text(), None)),
+        Some(entry) => Ok(Outcome::new(entry, entry.text(), None)),
         None => {
             let ids = library.iter().map(|e| e.id);
             let near = closest(&id, ids.clone()).or_else(|| sharing_a_word(&id, ids));
@@ -92,7 +96,7 @@ fn sharing_a_word<'a>(name: &str, ids: impl Iterator<Item = &'a str> + Clone) ->
     })
 }
 
-fn list(library: &[Entry]) -> String {
+fn list(library: &[EffectExplained]) -> String {
     let mut text = String::new();
     for (domain, title) in [
         ("structure", "Robot and its measurement (FRFs)"),
@@ -108,21 +112,7 @@ fn list(library: &[Entry]) -> String {
     text
 }
 
-impl Entry {
-    fn json(&self) -> Value {
-        json!({
-            "effect": self.id,
-            "domain": self.domain,
-            "sites": self.sites,
-            "explanation": self.explanation,
-            "fingerprint": self.fingerprint,
-            "lab_check": self.background.lab_check,
-            "best_measured": self.background.best_measured,
-            "typical": self.background.typical,
-            "sources": self.background.sources,
-        })
-    }
-
+impl EffectExplained {
     fn text(&self) -> String {
         let mut text = format!("{} ({})\n", Emphasis::Strong.on(self.id), self.domain);
         let mut part = |title: &str, body: &str| {

@@ -1,4 +1,6 @@
-use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use crate::Result;
 use crate::campaign::Campaign;
@@ -6,9 +8,10 @@ use crate::commands::text::{Emphasis, files_first, number, percent, table};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::localise::{BestForm, DrawnPart, Localisation, LocalisedPlace, localise};
 use crate::identify::frfs::calibrate::Estimate;
-use crate::identify::{Options, StructureCase};
+use crate::identify::{HeldOut, Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
 use crate::report::verdict_card::size;
+use crate::revision::Side;
 use crate::text::shell_word;
 
 #[derive(clap::Args)]
@@ -45,83 +48,163 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
         _ => format!("nothing to add here; `lobestone compare {dir}` shows where the model fails"),
     };
     Ok(Outcome::new(
-        document(&case, &found),
+        Document::new(&case, &found),
         files_first(&[], &case.warnings) + &describe(&case, &found, args.places),
         Some(next),
     ))
 }
 
-fn document(case: &StructureCase, found: &Localisation) -> Value {
-    let best = found.places.first();
-    let curve = best.map(|p| {
-        json!({
-            "place": p.spot.label(),
-            "unit": p.stiffness_unit(),
-            "frequency_hz": p.curve.iter().map(|c| c.frequency_hz).collect::<Vec<_>>(),
-            "re": p.curve.iter().map(|c| finite(c.stiffness.re)).collect::<Vec<_>>(),
-            "im": p.curve.iter().map(|c| finite(c.stiffness.im)).collect::<Vec<_>>(),
-            "std": p.curve.iter().map(|c| finite(c.std)).collect::<Vec<_>>(),
-        })
-    });
-    json!({
-        "domain": "structure",
-        "revision": case.revision(),
-        "effects": case.effects(),
-        "significant": found.significant,
-        "explained_share": found.explained_share(),
-        "places": found.places.iter().map(place).collect::<Vec<_>>(),
-        "curve": curve,
-        "baseline": {
-            "reduced_chi2": found.baseline.reduced_chi2,
-            "held_out_nrms": found.baseline_held_out.as_ref().map(|h| h.nrms()),
-        },
-        "warnings": case.warnings,
-    })
+/// What `localise` found.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: Side,
+    revision: Option<usize>,
+    effects: Vec<String>,
+    significant: bool,
+    explained_share: Option<f64>,
+    places: Vec<PlaceDrawn<'a>>,
+    curve: Option<CurveDrawn>,
+    baseline: Baseline,
+    warnings: &'a [String],
 }
 
-/// JSON has no infinity: null where a line says nothing.
-fn finite(value: f64) -> Option<f64> {
-    value.is_finite().then_some(value)
-}
-
-/// Values and standard errors by the parameters' own names.
-fn by_name(estimates: &[Estimate]) -> (Map<String, Value>, Map<String, Value>) {
-    let (mut parameters, mut errors) = (Map::new(), Map::new());
-    for estimate in estimates {
-        let key = estimate.name.rsplit('.').next().unwrap_or(&estimate.name);
-        parameters.insert(key.to_string(), json!(estimate.value));
-        errors.insert(key.to_string(), json!(estimate.std_error));
+impl<'a> Document<'a> {
+    fn new(case: &'a StructureCase, found: &'a Localisation) -> Self {
+        Document {
+            domain: Side::Structure,
+            revision: case.revision(),
+            effects: case.effects(),
+            significant: found.significant,
+            explained_share: found.explained_share(),
+            places: found.places.iter().map(PlaceDrawn::of).collect(),
+            curve: found.places.first().map(CurveDrawn::of),
+            baseline: Baseline {
+                reduced_chi2: found.baseline.reduced_chi2,
+                held_out_nrms: found.baseline_held_out.as_ref().map(HeldOut::nrms),
+            },
+            warnings: &case.warnings,
+        }
     }
-    (parameters, errors)
 }
 
-/// One place for the document.
-pub fn place(p: &LocalisedPlace) -> Value {
-    let (parameters, errors) = by_name(p.best.as_ref().map_or(&[], |b| &b.first.parameters));
-    json!({
-        "place": p.spot.label(),
-        "add": p.best.as_ref().map(|b| b.first.instance.label()),
-        "left": p.left,
-        "consistency": p.consistency,
-        "held_out_nrms": p.best.as_ref().and_then(|b| b.held_out.as_ref().map(|h| h.nrms())),
-        "form": p.best.as_ref().map(|b| b.first.form().label()),
-        "forms": p.forms.iter().map(|f| json!({ "form": f.form.label(), "delta_bic": f.delta_bic })).collect::<Vec<_>>(),
-        "parameters": parameters,
-        "errors": errors,
-        "delta_bic": p.best.as_ref().map(|b| b.delta_bic),
-        "p_value": p.best.as_ref().map(|b| b.p_value),
-        "tied_with": p.tied_with,
-        "second": p.best.as_ref().and_then(|b| b.second.as_ref()).map(|second| {
-            let (parameters, errors) = by_name(&second.parameters);
-            json!({
-                "place": second.spot.label(),
-                "add": second.instance.label(),
-                "form": second.form().label(),
-                "parameters": parameters,
-                "errors": errors,
-            })
-        }),
-    })
+/// The model as it stands.
+#[derive(Serialize)]
+struct Baseline {
+    reduced_chi2: f64,
+    held_out_nrms: Option<f64>,
+}
+
+/// The dynamic stiffness of a place over frequency, in `unit`; infinite, which JSON writes as null, where a line says nothing.
+#[derive(Serialize)]
+struct CurveDrawn {
+    place: String,
+    unit: &'static str,
+    frequency_hz: Vec<f64>,
+    re: Vec<f64>,
+    im: Vec<f64>,
+    std: Vec<f64>,
+}
+
+impl CurveDrawn {
+    fn of(place: &LocalisedPlace) -> Self {
+        let curve = place.curve.iter();
+        CurveDrawn {
+            place: place.spot.label(),
+            unit: place.stiffness_unit(),
+            frequency_hz: curve.clone().map(|c| c.frequency_hz).collect(),
+            re: curve.clone().map(|c| c.stiffness.re).collect(),
+            im: curve.clone().map(|c| c.stiffness.im).collect(),
+            std: curve.map(|c| c.std).collect(),
+        }
+    }
+}
+
+/// One place, and what acts there.
+#[derive(Serialize)]
+pub(crate) struct PlaceDrawn<'a> {
+    place: String,
+    add: Option<String>,
+    left: f64,
+    consistency: f64,
+    held_out_nrms: Option<f64>,
+    form: Option<&'static str>,
+    forms: Vec<FormTried>,
+    parameters: ByName<'a>,
+    errors: ByName<'a>,
+    delta_bic: Option<f64>,
+    p_value: Option<f64>,
+    tied_with: &'a [String],
+    second: Option<SecondDrawn<'a>>,
+}
+
+impl<'a> PlaceDrawn<'a> {
+    pub fn of(p: &'a LocalisedPlace) -> Self {
+        let best = p.best.as_ref();
+        let (parameters, errors) = best.map(|b| by_name(&b.first.parameters)).unwrap_or_default();
+        PlaceDrawn {
+            place: p.spot.label(),
+            add: best.map(|b| b.first.instance.label()),
+            left: p.left,
+            consistency: p.consistency,
+            held_out_nrms: best.and_then(|b| b.held_out.as_ref().map(HeldOut::nrms)),
+            form: best.map(|b| b.first.form().label()),
+            forms: p
+                .forms
+                .iter()
+                .map(|f| FormTried {
+                    form: f.form.label(),
+                    delta_bic: f.delta_bic,
+                })
+                .collect(),
+            parameters,
+            errors,
+            delta_bic: best.map(|b| b.delta_bic),
+            p_value: best.map(|b| b.p_value),
+            tied_with: &p.tied_with,
+            second: best.and_then(|b| b.second.as_ref()).map(SecondDrawn::of),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct FormTried {
+    form: &'static str,
+    delta_bic: f64,
+}
+
+/// What acts along another displacement of the same place.
+#[derive(Serialize)]
+struct SecondDrawn<'a> {
+    place: String,
+    add: String,
+    form: &'static str,
+    parameters: ByName<'a>,
+    errors: ByName<'a>,
+}
+
+impl<'a> SecondDrawn<'a> {
+    fn of(second: &'a DrawnPart) -> Self {
+        let (parameters, errors) = by_name(&second.parameters);
+        SecondDrawn {
+            place: second.spot.label(),
+            add: second.instance.label(),
+            form: second.form().label(),
+            parameters,
+            errors,
+        }
+    }
+}
+
+/// Numbers by the parameters' own names.
+type ByName<'a> = BTreeMap<&'a str, f64>;
+
+/// Values and standard errors.
+fn by_name(estimates: &[Estimate]) -> (ByName<'_>, ByName<'_>) {
+    let each = estimates.iter().map(|e| {
+        let key = e.name.rsplit('.').next().unwrap_or(&e.name);
+        ((key, e.value), (key, e.std_error))
+    });
+    each.unzip()
 }
 
 fn describe(case: &StructureCase, found: &Localisation, most: usize) -> String {

@@ -1,11 +1,15 @@
-use serde_json::{Map, Value, json};
+use serde::Serialize;
 
 use crate::analysis::planning::{PlanFindings, PlanRequest};
 use crate::campaign::Campaign;
+use crate::commands::document::EffectBarred;
 use crate::commands::text::{files_first, number, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome, next_step};
-use crate::discrepancy::outlook::plan::{PlanOutlook, PlannedEffect, SEEN_SIGMAS};
+use crate::discrepancy::outlook::plan::{
+    Confusable, PlanOutlook, PlannedAddition, PlannedEffect, SEEN_SIGMAS,
+};
 use crate::ingest::Dof;
+use crate::revision::Side;
 use crate::{InputError, Result};
 
 #[derive(clap::Args)]
@@ -40,23 +44,12 @@ pub struct PlanArgs {
 pub fn run(args: PlanArgs) -> Result<Outcome> {
     let campaign = Campaign::load_planned(&args.campaign.dir)?;
     let findings = PlanFindings::run(&campaign, &request(&args)?)?;
-    let plan = &findings.plan;
-    let json = json!({
-        "domain": "structure",
-        "planned_frfs": findings.planned,
-        "measured_frfs": findings.measured,
-        "postures": findings.postures,
-        "noise": { "relative": findings.noise.relative, "floor_m_per_n": findings.noise.floor },
-        "effects": plan.effects.iter().map(effect).collect::<Vec<_>>(),
-        "confusable": plan.confusable,
-        "additions": plan.additions,
-        "out_of_reach": plan.out_of_reach,
-        "not_possible": plan.not_possible.iter().map(|(e, why)| json!({ "effect": e, "why": why })).collect::<Vec<_>>(),
-        "warnings": findings.warnings,
-    });
-    let next = next_step::planned(&campaign.dir, plan.additions.first().map(|a| a.what.as_str()));
+    let next = next_step::planned(
+        &campaign.dir,
+        findings.plan.additions.first().map(|a| a.what.as_str()),
+    );
     Ok(Outcome::new(
-        json,
+        Document::new(&findings),
         files_first(&[], campaign.guesses.of_robot_told().as_slice())
             + &describe(&findings)
             + &warnings(&findings.warnings),
@@ -104,19 +97,66 @@ fn request(args: &PlanArgs) -> Result<PlanRequest> {
     })
 }
 
-fn effect(planned: &PlannedEffect) -> Value {
-    let size: Map<String, Value> = planned
-        .size
-        .iter()
-        .map(|(name, value, _)| (name.clone(), json!(value)))
-        .collect();
-    json!({
-        "effect": planned.effect,
-        "site": planned.site,
-        "sigmas": planned.sigmas,
-        "seen": planned.sigmas >= SEEN_SIGMAS,
-        "size": size,
-    })
+/// What `plan` found.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: Side,
+    planned_frfs: usize,
+    measured_frfs: usize,
+    postures: &'a [String],
+    noise: NoiseAssumed,
+    effects: Vec<EffectShown<'a>>,
+    confusable: &'a [Confusable],
+    additions: &'a [PlannedAddition],
+    out_of_reach: &'a [String],
+    not_possible: Vec<EffectBarred<'a>>,
+    warnings: &'a [String],
+}
+
+impl<'a> Document<'a> {
+    fn new(findings: &'a PlanFindings) -> Self {
+        let plan = &findings.plan;
+        Document {
+            domain: Side::Structure,
+            planned_frfs: findings.planned,
+            measured_frfs: findings.measured,
+            postures: &findings.postures,
+            noise: NoiseAssumed {
+                relative: findings.noise.relative,
+                floor_m_per_n: findings.noise.floor,
+            },
+            effects: plan.effects.iter().map(EffectShown::of).collect(),
+            confusable: &plan.confusable,
+            additions: &plan.additions,
+            out_of_reach: &plan.out_of_reach,
+            not_possible: EffectBarred::all(&plan.not_possible),
+            warnings: &findings.warnings,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct NoiseAssumed {
+    /// Share of the response.
+    relative: f64,
+    floor_m_per_n: f64,
+}
+
+/// How plainly an effect would show, and whether that is enough.
+#[derive(Serialize)]
+struct EffectShown<'a> {
+    #[serde(flatten)]
+    planned: &'a PlannedEffect,
+    seen: bool,
+}
+
+impl<'a> EffectShown<'a> {
+    fn of(planned: &'a PlannedEffect) -> Self {
+        EffectShown {
+            planned,
+            seen: planned.sigmas >= SEEN_SIGMAS,
+        }
+    }
 }
 
 fn describe(findings: &PlanFindings) -> String {

@@ -1,8 +1,11 @@
-use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+use serde::Serialize;
 
 use crate::Result;
 use crate::analysis::{Addition, CampaignSide};
 use crate::campaign::Campaign;
+use crate::commands::document::{ErrorHeldOut, FitFound};
 use crate::commands::find::calibrate::describe_parameters;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, files_first, percent, table, warnings, wrapped};
@@ -13,7 +16,7 @@ use crate::identify::Modelled;
 use crate::identify::{Calibration, Options};
 use crate::report::number::plus_minus;
 use crate::report::words::parameter_of;
-use crate::revision::RevisionLog;
+use crate::revision::{RevisionLog, Side};
 
 #[derive(clap::Args)]
 pub struct AddArgs {
@@ -46,41 +49,78 @@ pub fn after(log: RevisionLog, campaign: &Campaign, effect: &str) -> Result<Outc
 /// `parameters`: a table of them.
 fn outcome<D: CampaignSide>(addition: &Addition<D>, parameters: String, guide: Guide<'_>) -> Outcome {
     let next = next_step(guide, addition);
-    Outcome::new(document(addition), describe(addition, &parameters), Some(next))
+    Outcome::new(
+        Document::new(addition),
+        describe(addition, &parameters),
+        Some(next),
+    )
 }
 
-fn document<D: CampaignSide>(addition: &Addition<D>) -> Value {
-    let Extension {
-        instance,
-        before,
-        after,
-        progress,
-        ..
-    } = &addition.extension;
-    let calibration = &after.calibration;
-    let mut error = json!(addition.totals);
-    error["held_out_nrms"] = json!(after.held_out_nrms());
-    json!({
-        "domain": D::SIDE,
-        "revision": addition.revision,
-        "effect": instance.effect.id(),
-        "site": instance.site.label(),
-        "variant": instance.variant_label().map(|(key, value)| json!({ key: value })),
-        "effects": addition.effects,
-        "parameters": calibration.parameters,
-        "error": error,
-        "iterations": calibration.iterations,
-        "converged": calibration.converged(),
-        "not_converged_because": calibration.ending.reason(),
-        "vanished": addition.extension.vanished,
-        "reduced_chi2": calibration.reduced_chi2,
-        "starts": calibration.starts,
-        "starts_agreeing": calibration.starts_agreeing,
-        "before": side(before),
-        "after": side(after),
-        "progress": progress,
-        "warnings": addition.noticed.iter().chain(&addition.warnings).collect::<Vec<_>>(),
-    })
+/// What `add` did.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: Side,
+    revision: usize,
+    effect: &'static str,
+    site: Option<String>,
+    /// The discrete choice as key and value.
+    variant: Option<BTreeMap<&'static str, &'static str>>,
+    effects: &'a [String],
+    #[serde(flatten)]
+    fit: FitFound<'a>,
+    error: ErrorHeldOut,
+    vanished: bool,
+    before: FitInShort,
+    after: FitInShort,
+    progress: Option<bool>,
+    warnings: Vec<&'a String>,
+}
+
+impl<'a> Document<'a> {
+    fn new<D: CampaignSide>(addition: &'a Addition<D>) -> Self {
+        let Extension {
+            instance,
+            before,
+            after,
+            vanished,
+            progress,
+        } = &addition.extension;
+        Document {
+            domain: D::SIDE,
+            revision: addition.revision,
+            effect: instance.effect.id(),
+            site: instance.site.label(),
+            variant: instance.variant_label().map(|variant| BTreeMap::from([variant])),
+            effects: &addition.effects,
+            fit: FitFound::of(&after.calibration),
+            error: ErrorHeldOut {
+                totals: addition.totals,
+                held_out_nrms: after.held_out_nrms(),
+            },
+            vanished: *vanished,
+            before: FitInShort::of(before),
+            after: FitInShort::of(after),
+            progress: *progress,
+            warnings: addition.noticed.iter().chain(&addition.warnings).collect(),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct FitInShort {
+    nrms: f64,
+    held_out_nrms: Option<f64>,
+    reduced_chi2: f64,
+}
+
+impl FitInShort {
+    fn of<D: Modelled>(fitted: &Fitted<D>) -> Self {
+        FitInShort {
+            nrms: fitted.residual.nrms,
+            held_out_nrms: fitted.held_out_nrms(),
+            reduced_chi2: fitted.calibration.reduced_chi2,
+        }
+    }
 }
 
 fn describe_estimates(calibration: &Calibration) -> String {
@@ -90,14 +130,6 @@ fn describe_estimates(calibration: &Calibration) -> String {
         .map(|p| vec![parameter_of(&p.name), plus_minus(p.value, p.std_error, p.unit)])
         .collect();
     table(&["parameter", "fitted ± standard error"], &rows)
-}
-
-fn side<D: Modelled>(fitted: &Fitted<D>) -> Value {
-    json!({
-        "nrms": fitted.residual.nrms,
-        "held_out_nrms": fitted.held_out_nrms(),
-        "reduced_chi2": fitted.calibration.reduced_chi2,
-    })
 }
 
 fn next_step<D: CampaignSide>(guide: Guide<'_>, addition: &Addition<D>) -> String {

@@ -1,11 +1,11 @@
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, error_bar, percent, table, warnings};
 use crate::commands::{Outcome, SideArgs, side};
-use crate::revision::{self, Revision, RevisionLog, fingerprint};
+use crate::revision::{self, Evidence, RecordedParameter, Revision, RevisionLog, fingerprint};
 use crate::text::shell_word;
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
@@ -23,7 +23,13 @@ pub fn of(campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
     let guide = Guide { campaign, side };
     let Some(current) = revisions.last() else {
         return Ok(Outcome::new(
-            json!({ "domain": side, "revisions": [], "noise_floor_nrms": null, "undone": [], "warnings": [] }),
+            Document {
+                domain: side,
+                revisions: Vec::new(),
+                noise_floor_nrms: None,
+                undone: Vec::new(),
+                warnings: &[],
+            },
             "no effect was added to this campaign's model yet\n".into(),
             Some(guide.history(None, false)),
         ));
@@ -42,13 +48,16 @@ pub fn of(campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
             old.join(", ")
         )],
     };
-    let json = json!({
-        "domain": side,
-        "revisions": revisions.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
-        "noise_floor_nrms": current.noise_floor_nrms,
-        "undone": undone.iter().map(|r| document(r, &fingerprint)).collect::<Vec<_>>(),
-        "warnings": notes,
-    });
+    let document = Document {
+        domain: side,
+        revisions: revisions
+            .iter()
+            .map(|r| RevisionTold::of(r, &fingerprint))
+            .collect(),
+        noise_floor_nrms: Some(current.noise_floor_nrms),
+        undone: undone.iter().map(|r| RevisionTold::of(r, &fingerprint)).collect(),
+        warnings: &notes,
+    };
     let mut text = describe(&revisions);
     if !undone.is_empty() {
         let titles: Vec<String> = undone.iter().map(|r| r.title()).collect();
@@ -56,25 +65,54 @@ pub fn of(campaign: &Campaign, side: revision::Side) -> Result<Outcome> {
     }
     text += &warnings(&notes);
     let next = guide.history(Some(current), current.data != fingerprint);
-    Ok(Outcome::new(json, text, Some(next)))
+    Ok(Outcome::new(document, text, Some(next)))
 }
 
-/// One revision for other programs.
-pub fn document(revision: &Revision, fingerprint: &str) -> Value {
-    json!({
-        "revision": revision.revision,
-        "effects": revision.labels(),
-        "variants": revision.effects.iter().map(|e| &e.variant).collect::<Vec<_>>(),
-        "nrms": revision.nrms,
-        "held_out_nrms": revision.held_out_nrms,
-        "noise_floor_nrms": revision.noise_floor_nrms,
-        "reduced_chi2": revision.reduced_chi2,
-        "progress": revision.progress,
-        "parameters": revision.parameters,
-        "when": revision.when,
-        "why": revision.why,
-        "same_data": revision.data == fingerprint,
-    })
+/// What was added to one side of a campaign.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: revision::Side,
+    revisions: Vec<RevisionTold<'a>>,
+    noise_floor_nrms: Option<f64>,
+    undone: Vec<RevisionTold<'a>>,
+    warnings: &'a [String],
+}
+
+/// One revision.
+#[derive(Serialize)]
+pub(crate) struct RevisionTold<'a> {
+    revision: usize,
+    effects: Vec<&'a str>,
+    variants: Vec<Option<&'a str>>,
+    nrms: f64,
+    held_out_nrms: Option<f64>,
+    noise_floor_nrms: f64,
+    reduced_chi2: f64,
+    progress: Option<bool>,
+    parameters: &'a [RecordedParameter],
+    when: &'a str,
+    why: Option<&'a Evidence>,
+    same_data: bool,
+}
+
+impl<'a> RevisionTold<'a> {
+    /// `fingerprint`: of the data as they are now.
+    pub fn of(revision: &'a Revision, fingerprint: &str) -> Self {
+        RevisionTold {
+            revision: revision.revision,
+            effects: revision.labels(),
+            variants: revision.effects.iter().map(|e| e.variant.as_deref()).collect(),
+            nrms: revision.nrms,
+            held_out_nrms: revision.held_out_nrms,
+            noise_floor_nrms: revision.noise_floor_nrms,
+            reduced_chi2: revision.reduced_chi2,
+            progress: revision.progress,
+            parameters: &revision.parameters,
+            when: &revision.when,
+            why: revision.why.as_ref(),
+            same_data: revision.data == fingerprint,
+        }
+    }
 }
 
 fn describe(revisions: &[&Revision]) -> String {

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
-use serde_json::{Value, json};
+use nalgebra::{DMatrix, Vector3};
+use serde::Serialize;
 
 use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
@@ -46,17 +46,14 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
     let model = structure_model(&campaign)?;
     let mut left_out = Vec::new();
     let nominal = postures(&campaign, &model, &model.nominal_theta(), &args, &mut left_out)?;
-    let mut json = json!({
-        "robot": model.robot.spec.name,
-        "moving_mass_kg": model.robot.moving_mass_kg(),
-        "postures": nominal,
-    });
     let mut text = format!(
         "{}, as the robot file has it\n{}",
         model.robot.spec.name,
         describe(&nominal)
     );
     let mut sources = of_robot_file(&model);
+    let mut calibrated = None;
+    let notes: Vec<String>;
     if !campaign.frfs.is_empty() {
         let StructureAnalysis {
             case, calibration, ..
@@ -67,19 +64,18 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
             case.model_description()
         );
         text += &describe(&after);
-        let mut notes = case.warnings.clone();
-        notes.extend(left_out);
-        text += &warnings(&notes);
-        sources = calibrated(&campaign, &case.model, &calibration.theta, case.effects());
-        json["calibrated_postures"] = after.into();
-        json["revision"] = case.revision().into();
-        json["effects"] = case.effects().into();
-        json["warnings"] = notes.into();
+        notes = case.warnings.iter().cloned().chain(left_out).collect();
+        sources = of_calibrated(&campaign, &case.model, &calibration.theta, case.effects());
+        calibrated = Some(AfterCalibration {
+            calibrated_postures: after,
+            revision: case.revision(),
+            effects: case.effects(),
+        });
     } else {
-        let notes: Vec<String> = model.robot.spec.guesses_told().chain(left_out).collect();
-        text += &warnings(&notes);
-        json["warnings"] = notes.into();
+        notes = model.robot.spec.guesses_told().chain(left_out).collect();
     }
+    text += &warnings(&notes);
+    let mut written = None;
     if let Some(file) = &args.urdf {
         let files = write_urdf(file, &model, &sources)?;
         text += &format!(
@@ -88,10 +84,96 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
             files[1].display(),
             sources.source
         );
-        json["written"] = json!(files);
+        written = Some(files);
     }
     let next = Guide::structure(&campaign).modelled();
-    Ok(Outcome::new(json, text, Some(next)))
+    let document = Document {
+        robot: &model.robot.spec.name,
+        moving_mass_kg: model.robot.moving_mass_kg(),
+        postures: nominal,
+        calibrated,
+        written,
+        warnings: notes,
+    };
+    Ok(Outcome::new(document, text, Some(next)))
+}
+
+/// What `model` says.
+#[derive(Serialize)]
+struct Document<'a> {
+    robot: &'a str,
+    moving_mass_kg: f64,
+    postures: Vec<PostureTold>,
+    /// Where there are FRFs.
+    #[serde(flatten)]
+    calibrated: Option<AfterCalibration>,
+    /// The URDF and the file next to it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    written: Option<[PathBuf; 2]>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct AfterCalibration {
+    calibrated_postures: Vec<PostureTold>,
+    revision: Option<usize>,
+    effects: Vec<String>,
+}
+
+/// The robot at one posture.
+#[derive(Serialize)]
+struct PostureTold {
+    id: String,
+    #[serde(flatten)]
+    free: Dynamics,
+    tcp_m: [f64; 3],
+    tool_axis: [f64; 3],
+    centre_of_mass_m: Option<[f64; 3]>,
+    gravity_torques_nm: Vec<f64>,
+    /// With the tool point held by the contacts, where the campaign has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    held: Option<Dynamics>,
+    #[serde(flatten)]
+    matrices: Option<Matrices>,
+}
+
+/// How a posture vibrates and gives way.
+#[derive(Serialize)]
+struct Dynamics {
+    natural_frequencies_hz: Vec<f64>,
+    tcp_stiffness_n_per_m: Axes,
+    flange_stiffness_n_per_m: Axes,
+}
+
+impl Dynamics {
+    fn of(report: PostureReport) -> Self {
+        Dynamics {
+            natural_frequencies_hz: report.natural_frequencies_hz,
+            tcp_stiffness_n_per_m: Axes::of(report.tcp_stiffness_n_per_m),
+            flange_stiffness_n_per_m: Axes::of(report.flange_stiffness_n_per_m),
+        }
+    }
+}
+
+/// One value an axis of the base.
+#[derive(Serialize)]
+struct Axes {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+impl Axes {
+    fn of([x, y, z]: [f64; 3]) -> Self {
+        Axes { x, y, z }
+    }
+}
+
+/// Stiffness and mass in centre-of-mass coordinates, row by row, SI.
+#[derive(Serialize)]
+struct Matrices {
+    k_c: Vec<Vec<f64>>,
+    m_c: Vec<Vec<f64>>,
 }
 
 fn of_robot_file(model: &StructureModel) -> Sources {
@@ -111,7 +193,12 @@ fn of_baseline(baseline: &Baseline, source: String, left_out: Vec<String>) -> So
     }
 }
 
-fn calibrated(campaign: &Campaign, model: &StructureModel, theta: &[f64], effects: Vec<String>) -> Sources {
+fn of_calibrated(
+    campaign: &Campaign,
+    model: &StructureModel,
+    theta: &[f64],
+    effects: Vec<String>,
+) -> Sources {
     let source = format!("calibrated on the FRFs of {}", campaign.name);
     let held = |effect: &String| effect.starts_with("link-flexibility");
     let beyond = effects.into_iter().filter(|effect| !held(effect));
@@ -172,7 +259,7 @@ fn postures(
     theta: &[f64],
     args: &ModelArgs,
     left_out: &mut Vec<String>,
-) -> Result<Vec<Value>> {
+) -> Result<Vec<PostureTold>> {
     let mut baseline = model.baseline(theta, false);
     baseline.young_pa = young_pa(model, args)?.map(Dual::constant);
     campaign
@@ -183,26 +270,16 @@ fn postures(
             let chain =
                 |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, Default::default(), false);
             let report = PostureReport::new(&model.robot, &kinematics, &chain(&baseline))?;
-            let mut value = json!({
-                "id": posture.id,
-                "natural_frequencies_hz": report.natural_frequencies_hz,
-                "tcp_m": report.tcp_m,
-                "tool_axis": report.tool_axis,
-                "tcp_stiffness_n_per_m": axes(report.tcp_stiffness_n_per_m),
-                "flange_stiffness_n_per_m": axes(report.flange_stiffness_n_per_m),
-                "centre_of_mass_m": model.robot.centre_of_mass(&kinematics).map(|c| [c.x, c.y, c.z]),
-                "gravity_torques_nm": model
-                    .robot
-                    .gravity_torques_nm(&kinematics, Vector3::new(0.0, 0.0, -STANDARD_GRAVITY)),
-            });
-            if !campaign.contacts.is_empty() {
-                let held = held_report(&model.robot, &kinematics, &chain(&baseline), &campaign.contacts)?;
-                value["held"] = json!({
-                    "natural_frequencies_hz": held.natural_frequencies_hz,
-                    "tcp_stiffness_n_per_m": axes(held.tcp_stiffness_n_per_m),
-                    "flange_stiffness_n_per_m": axes(held.flange_stiffness_n_per_m),
-                });
-            }
+            let held = match campaign.contacts.as_slice() {
+                [] => None,
+                contacts => Some(held_report(
+                    &model.robot,
+                    &kinematics,
+                    &chain(&baseline),
+                    contacts,
+                )?),
+            };
+            let mut matrices = None;
             if args.matrices {
                 let mut bending = baseline.clone();
                 if !model.has("link-flexibility") {
@@ -220,38 +297,41 @@ fn postures(
                     chain.bodies.truncate(links);
                 }
                 let form = export::centre_of_mass_form(&chain)?;
-                value["k_c"] = rows(&form.stiffness);
-                value["m_c"] = rows(&form.mass);
+                matrices = Some(Matrices {
+                    k_c: rows(&form.stiffness),
+                    m_c: rows(&form.mass),
+                });
             }
-            Ok(value)
+            let down = Vector3::new(0.0, 0.0, -STANDARD_GRAVITY);
+            Ok(PostureTold {
+                id: posture.id.clone(),
+                tcp_m: report.tcp_m,
+                tool_axis: report.tool_axis,
+                free: Dynamics::of(report),
+                centre_of_mass_m: model.robot.centre_of_mass(&kinematics).map(|c| [c.x, c.y, c.z]),
+                gravity_torques_nm: model.robot.gravity_torques_nm(&kinematics, down),
+                held: held.map(Dynamics::of),
+                matrices,
+            })
         })
         .collect()
 }
 
-fn axes([x, y, z]: [f64; 3]) -> Value {
-    json!({ "x": x, "y": y, "z": z })
-}
-
-fn rows(matrix: &nalgebra::DMatrix<f64>) -> Value {
+fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix
         .row_iter()
-        .map(|row| row.iter().copied().collect::<Vec<f64>>())
-        .collect::<Vec<_>>()
-        .into()
+        .map(|row| row.iter().copied().collect())
+        .collect()
 }
 
 /// The postures free, and held by the contacts where the campaign has any.
-fn describe(postures: &[Value]) -> String {
-    let held: Vec<Value> = postures
+fn describe(postures: &[PostureTold]) -> String {
+    let held: Vec<(&str, &Dynamics)> = postures
         .iter()
-        .filter(|p| p["held"].is_object())
-        .map(|p| {
-            let mut held = p["held"].clone();
-            held["id"] = p["id"].clone();
-            held
-        })
+        .filter_map(|p| Some((p.id.as_str(), p.held.as_ref()?)))
         .collect();
-    let free = stiffness_table(postures);
+    let free: Vec<(&str, &Dynamics)> = postures.iter().map(|p| (p.id.as_str(), &p.free)).collect();
+    let free = stiffness_table(&free);
     match held.is_empty() {
         true => free,
         false => format!(
@@ -261,23 +341,19 @@ fn describe(postures: &[Value]) -> String {
     }
 }
 
-fn stiffness_table(postures: &[Value]) -> String {
-    let stiffness = |p: &Value, key: &str, axis: &str| number(p[key][axis].as_f64().unwrap_or(0.0) / 1e6, 4);
+fn stiffness_table(postures: &[(&str, &Dynamics)]) -> String {
     let rows: Vec<Vec<String>> = postures
         .iter()
-        .map(|p| {
-            let frequencies: Vec<String> = p["natural_frequencies_hz"]
-                .as_array()
-                .into_iter()
-                .flatten()
+        .map(|(id, p)| {
+            let frequencies: Vec<String> = p
+                .natural_frequencies_hz
+                .iter()
                 .take(6)
-                .map(|f| format!("{:.2}", f.as_f64().unwrap_or(0.0)))
+                .map(|f| format!("{f:.2}"))
                 .collect();
-            let mut row = vec![p["id"].as_str().unwrap_or("").to_string()];
-            for key in ["tcp_stiffness_n_per_m", "flange_stiffness_n_per_m"] {
-                for axis in ["x", "y", "z"] {
-                    row.push(stiffness(p, key, axis));
-                }
+            let mut row = vec![id.to_string()];
+            for Axes { x, y, z } in [&p.tcp_stiffness_n_per_m, &p.flange_stiffness_n_per_m] {
+                row.extend([x, y, z].map(|k| number(k / 1e6, 4)));
             }
             row.push(frequencies.join(" "));
             row

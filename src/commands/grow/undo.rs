@@ -1,8 +1,8 @@
-use serde_json::json;
+use serde::Serialize;
 
 use crate::Result;
 use crate::campaign::Campaign;
-use crate::commands::grow::history::document;
+use crate::commands::grow::history::RevisionTold;
 use crate::commands::next_step::Guide;
 use crate::commands::text::percent;
 use crate::commands::{Outcome, SideArgs, side};
@@ -20,12 +20,12 @@ pub fn after(mut log: RevisionLog, campaign: &Campaign, side: revision::Side) ->
     let undone = log.undo(side)?;
     let current = log.current(side);
     let labels = current.map(|r| r.labels()).unwrap_or_default();
-    let json = json!({
-        "domain": side,
-        "undone": document(&undone, &fingerprint(campaign, side)?),
-        "revision": current.map(|r| r.revision),
-        "effects": labels,
-    });
+    let document = Document {
+        domain: side,
+        undone: RevisionTold::of(&undone, &fingerprint(campaign, side)?),
+        revision: current.map(|r| r.revision),
+        effects: &labels,
+    };
     let model = std::iter::once("baseline").chain(labels.iter().copied());
     let mut text = format!(
         "undone: revision {}\nmodel: {}\n",
@@ -40,5 +40,14 @@ pub fn after(mut log: RevisionLog, campaign: &Campaign, side: revision::Side) ->
         );
     }
     let guide = Guide { campaign, side };
-    Ok(Outcome::new(json, text, Some(guide.undone())))
+    Ok(Outcome::new(document, text, Some(guide.undone())))
+}
+
+/// What `undo` took back, and what is left.
+#[derive(Serialize)]
+struct Document<'a> {
+    domain: revision::Side,
+    undone: RevisionTold<'a>,
+    revision: Option<usize>,
+    effects: &'a [&'a str],
 }

@@ -1,10 +1,10 @@
 //! `lobestone batch`: many campaigns, in shards.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use serde_json::json;
+use serde::Serialize;
 
 use crate::analysis::Shard;
 use crate::analysis::many::batch::{
@@ -103,19 +103,25 @@ pub fn run(args: BatchArgs) -> Result<Outcome> {
     let failures: Vec<(&ManifestEntry, &str)> =
         work.iter().filter_map(|(e, r)| Some((*e, failure(r)?))).collect();
     let seconds = begun.elapsed().as_secs_f64();
-    let json = json!({
-        "manifest": args.manifest,
-        "shard": shard.number,
-        "shards": shard.of,
-        "command": steps.name(),
-        "campaigns": work.len(),
-        "done": work.len() - failures.len(),
-        "failed": failures.len(),
-        "skipped": skipped,
-        "failures": failures.iter().map(|(e, error)| json!({ "campaign": e.campaign, "error": error })).collect::<Vec<_>>(),
-        "seconds": seconds,
-        "tables": tables,
-    });
+    let document = Document {
+        manifest: &args.manifest,
+        shard: shard.number,
+        shards: shard.of,
+        command: steps.name(),
+        campaigns: work.len(),
+        done: work.len() - failures.len(),
+        failed: failures.len(),
+        skipped,
+        failures: failures
+            .iter()
+            .map(|(entry, error)| CampaignFailed {
+                campaign: &entry.campaign,
+                error,
+            })
+            .collect(),
+        seconds,
+        tables: &tables,
+    };
     let mut text = format!(
         "shard {} of {}: {} campaigns, {skipped} of them were there already, {} in {} s\n",
         shard.number,
@@ -138,7 +144,29 @@ pub fn run(args: BatchArgs) -> Result<Outcome> {
         1 => format!("run {fleet}"),
         _ => format!("when every shard is there, run {fleet}"),
     };
-    Ok(Outcome::new(json, text, Some(next)))
+    Ok(Outcome::new(document, text, Some(next)))
+}
+
+/// What `batch` did.
+#[derive(Serialize)]
+struct Document<'a> {
+    manifest: &'a Path,
+    shard: usize,
+    shards: usize,
+    command: String,
+    campaigns: usize,
+    done: usize,
+    failed: usize,
+    skipped: usize,
+    failures: Vec<CampaignFailed<'a>>,
+    seconds: f64,
+    tables: &'a [PathBuf],
+}
+
+#[derive(Serialize)]
+struct CampaignFailed<'a> {
+    campaign: &'a str,
+    error: &'a str,
 }
 
 /// Why a campaign, or a side of it, could not be worked on.

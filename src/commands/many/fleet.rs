@@ -1,11 +1,11 @@
 //! `lobestone fleet`: what a batch found, robot by robot over time.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::Result;
-use crate::analysis::many::fleet::{Attention, Fleet, RobotHistory};
+use crate::analysis::many::fleet::{Attention, Fleet, Night, RobotHistory};
 use crate::commands::Outcome;
 use crate::commands::text::{Emphasis, number, percent, table, warnings, wrapped};
 use crate::report::fleet_page;
@@ -60,38 +60,55 @@ pub fn run(args: FleetArgs) -> Result<Outcome> {
     let page = fleet_page::page(&fleet, "Fleet", counts, &remarks);
     let written = page.write(&folder)?;
     let tables = batch_folder::write(&shards.table, |ending| folder.join(format!("all.{ending}")))?;
-    let json = json!({
-        "rows": counts[0],
-        "failed": failed,
-        "shards": shards.of,
-        "missing_shards": missing,
-        "robots": fleet.robots.iter().map(document).collect::<Vec<_>>(),
-        "limits": fleet_page::ABOUT_LIMITS,
-        "html": written.html,
-        "images": written.images,
-        "tables": tables,
-        "warnings": remarks,
-    });
+    let document = Document {
+        rows: counts[0],
+        failed,
+        shards: shards.of,
+        missing_shards: &missing,
+        robots: fleet.robots.iter().map(RobotTold::of).collect(),
+        limits: fleet_page::ABOUT_LIMITS,
+        html: &written.html,
+        images: &written.images,
+        tables: &tables,
+        warnings: &remarks,
+    };
     let mut text = overview(&fleet) + &reasons(&fleet) + &warnings(&remarks);
     text += &format!("\npage     {}\n", written.html.display());
     for table in &tables {
         text += &format!("table    {}\n", table.display());
     }
-    Ok(Outcome::new(json, text, None))
+    Ok(Outcome::new(document, text, None))
 }
 
-fn document(robot: &RobotHistory) -> Value {
-    let last = robot.last();
-    json!({
-        "robot": robot.robot,
-        "domain": robot.domain,
-        "attention": robot.attention,
-        "reasons": robot.reasons,
-        "new_verdict": robot.new_verdict,
-        "last": last,
-        "campaigns": robot.nights,
-        "parameters": robot.charts,
-    })
+/// What `fleet` found.
+#[derive(Serialize)]
+struct Document<'a> {
+    rows: usize,
+    failed: usize,
+    shards: usize,
+    missing_shards: &'a [String],
+    robots: Vec<RobotTold<'a>>,
+    limits: &'static str,
+    html: &'a Path,
+    images: &'a [PathBuf],
+    tables: &'a [PathBuf],
+    warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct RobotTold<'a> {
+    #[serde(flatten)]
+    history: &'a RobotHistory,
+    last: Option<&'a Night>,
+}
+
+impl<'a> RobotTold<'a> {
+    fn of(history: &'a RobotHistory) -> Self {
+        RobotTold {
+            history,
+            last: history.last(),
+        }
+    }
 }
 
 fn overview(fleet: &Fleet) -> String {

@@ -1,20 +1,19 @@
 use std::fmt::Write;
 
-use serde_json::json;
-
 use crate::Result;
 use crate::analysis::forces::cutting::waveform_groups;
 use crate::analysis::forces::force_records::{cutting_trials, identify_forces};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
+use crate::commands::measure::cfc_document::{Document, PowerLaws};
 use crate::commands::next_step::Guide;
 use crate::commands::text::files_first;
 use crate::commands::{CampaignArg, Outcome};
 use crate::cutting::kienzle;
 use crate::cutting::{
-    CfcOptions, CfcResult, ChangeReading, CoefficientChange, CutAnalysis, ForceAxis, ForceGroup, KienzleFit,
-    KnownValue, MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, by_axis,
-    coefficients_of, depth_mm, speed_text,
+    CfcOptions, CfcResult, ChangeReading, CoefficientChange, ForceAxis, ForceGroup, KienzleFit, KnownValue,
+    MaterialComparison, OrthogonalPrediction, RegressionMethod, SpeedTrends, coefficients_of, depth_mm,
+    speed_text,
 };
 use crate::text::capitalised;
 
@@ -47,92 +46,11 @@ pub fn run(args: CfcArgs) -> Result<Outcome> {
         groups: kienzle(&trials, &result, &result.groups),
         pooled: kienzle(&trials, &result, &result.pooled),
     };
-    let mut document = document(&campaign, &result, &waveforms, &power_laws);
-    document["setup"] = json!(setup);
     Ok(Outcome::new(
-        document,
+        Document::new(&campaign, &result, &waveforms, &power_laws, &setup),
         files_first(&setup, &result.warnings) + &text(&campaign, &result, &power_laws),
         Some(Guide::cutting(&campaign).coefficients()),
     ))
-}
-
-/// Kienzle's law for each group, in the groups' order.
-struct PowerLaws {
-    groups: Vec<Option<KienzleFit>>,
-    pooled: Vec<Option<KienzleFit>>,
-}
-
-fn document(
-    campaign: &Campaign,
-    result: &CfcResult,
-    waveforms: &[serde_json::Value],
-    power_laws: &PowerLaws,
-) -> serde_json::Value {
-    let with_kienzle = |groups: &[ForceGroup], laws: &[Option<KienzleFit>]| -> Vec<serde_json::Value> {
-        let each = groups.iter().zip(laws);
-        each.map(|(group, law)| {
-            let mut json = group.to_json();
-            json["kienzle"] = json!(law.as_ref().map(KienzleFit::to_json));
-            json
-        })
-        .collect()
-    };
-    let mut groups = with_kienzle(&result.groups, &power_laws.groups);
-    for (group, waveform) in groups.iter_mut().zip(waveforms) {
-        // The coefficients of the mean forces stay what they are: what they cannot separate is null there even where the
-        // waveform's shape can.
-        group["waveform"] = waveform.clone();
-    }
-    let process = result.pooled.first().map(|g| g.process);
-    json!({
-        "campaign": campaign.name,
-        "groups": groups,
-        "pooled": with_kienzle(&result.pooled, &power_laws.pooled),
-        "r2": process.map(|p| by_axis(p, &result.r2())),
-        "trends": result.trends.iter().flat_map(SpeedTrends::to_json).collect::<Vec<_>>(),
-        "materials": result.materials.iter().flat_map(MaterialComparison::to_json).collect::<Vec<_>>(),
-        "predicted": result.prediction.as_ref().map(OrthogonalPrediction::to_json),
-        "cuts": result.cuts.iter().map(cut_document).collect::<Vec<_>>(),
-        "warnings": result.warnings,
-    })
-}
-
-fn cut_document(cut: &CutAnalysis) -> serde_json::Value {
-    let mut averages = serde_json::Map::new();
-    for axis in ForceAxis::ALL {
-        if let Some(average) = cut.averages[axis.index()] {
-            averages.insert(axis.label().to_lowercase(), json!(average));
-        }
-    }
-    json!({
-        "id": cut.id,
-        "process": cut.process,
-        "spindle_rpm": cut.spindle_rpm,
-        "cutting_speed_m_per_min": cut.cutting_speed_m_per_min,
-        "feed_mm": cut.feed_mm,
-        "record_s": cut.record_s,
-        "air_before_s": cut.air_before_s,
-        "air_after_s": cut.air_after_s,
-        "steady_s": cut.steady_s,
-        "steady_given": cut.steady_given,
-        "revolutions": cut.revolutions,
-        "drift": cut.channels.iter().map(|c| json!({"channel": c.name, "line": c.drift})).collect::<Vec<_>>(),
-        "averages": averages,
-        "tooth_line": cut.tooth_line,
-        "spindle": cut.spindle.as_ref().map(|s| {
-            let found_rpm = cut.spindle_rpm * (1.0 + s.offset);
-            json!({
-                "found_rpm": found_rpm,
-                "std_error_rpm": cut.spindle_rpm * s.offset_std,
-                "change_over_cut": s.droop,
-                "change_std_error": s.droop_std,
-                "wander_rms": s.wander,
-                "wander_std_error": s.wander_std,
-                "in_step_before": s.in_step[0],
-                "in_step_after": s.in_step[1],
-            })
-        }),
-    })
 }
 
 fn text(campaign: &Campaign, result: &CfcResult, power_laws: &PowerLaws) -> String {

@@ -1,65 +1,118 @@
 //! What `lobestone lobes` says of a drill that is predicted from an orthogonal database.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::analysis::LobeAnalysis;
 use crate::commands::text::{number, table};
-use crate::cutting::{DrillCoefficients, DrillForces, LipElement};
+use crate::cutting::{ChiselShare, DrillCoefficients, DrillForces, DrillPrediction, LipElement};
 
 /// Elements of the lip that are shown, of those that were summed.
 const SHOWN: usize = 8;
 
-fn forces(of: &DrillForces, coefficients: &DrillCoefficients) -> Value {
-    json!({
-        "thrust_n": of.thrust_n,
-        "torque_nm": of.torque_nm,
-        "ktc_n_per_mm2": coefficients.ktc_n_per_mm2,
-        "krc_n_per_mm2": coefficients.krc_n_per_mm2,
-        "kac_n_per_mm2": coefficients.kac_n_per_mm2,
-    })
+/// The drill, predicted.
+#[derive(Serialize)]
+pub(super) struct DrillTold<'a> {
+    feed_per_rev_mm: f64,
+    inner_radius_mm: f64,
+    thrust_n: f64,
+    torque_nm: f64,
+    lips: PartForces<'a>,
+    chisel: Option<Chisel<'a>>,
+    elements: Vec<Element>,
 }
 
-fn element(e: &LipElement) -> Value {
-    let [ktc, krc, kac] = e.coefficients_n_per_mm2;
-    json!({
-        "radius_mm": e.place.radius_mm,
-        "rake_deg": e.place.rake_rad.to_degrees(),
-        "inclination_deg": e.place.inclination_rad.to_degrees(),
-        "chip_mm": e.chip_mm,
-        "cutting_speed_m_per_min": e.speed_m_per_min,
-        "ktc_n_per_mm2": ktc,
-        "krc_n_per_mm2": krc,
-        "kac_n_per_mm2": kac,
-    })
+impl<'a> DrillTold<'a> {
+    /// `None` where it is not predicted.
+    pub fn of(analysis: &'a LobeAnalysis) -> Option<Self> {
+        let drill = analysis.drill.as_ref()?;
+        let total = drill.total();
+        Some(DrillTold {
+            feed_per_rev_mm: drill.feed_per_rev_mm,
+            inner_radius_mm: drill.inner_radius_mm,
+            thrust_n: total.thrust_n,
+            torque_nm: total.torque_nm,
+            lips: PartForces {
+                forces: &drill.lips,
+                coefficients: &drill.lip_coefficients,
+            },
+            chisel: drill.chisel.as_ref().map(|chisel| Chisel::of(chisel, drill)),
+            elements: drill.elements.iter().map(Element::of).collect(),
+        })
+    }
 }
 
-/// `drill`; null where it is not predicted.
-pub fn document(analysis: &LobeAnalysis) -> Value {
-    let Some(drill) = &analysis.drill else {
-        return Value::Null;
-    };
-    let chisel = drill.chisel.as_ref().map(|chisel| match chisel {
-        Ok(chisel) => {
-            let mut found = forces(&chisel.forces, &chisel.coefficients);
-            found["half_length_mm"] = json!(drill.drill.chisel_mm);
-            found["rake_deg"] = json!(chisel.rake_rad.to_degrees());
-            found["indentation_radius_mm"] = json!(chisel.indentation_radius_mm);
-            found["indentation_thrust_n"] = json!(chisel.indentation_thrust_n);
-            found["left_out_because"] = Value::Null;
-            found
+/// What one part of the edge contributes.
+#[derive(Serialize)]
+struct PartForces<'a> {
+    #[serde(flatten)]
+    forces: &'a DrillForces,
+    #[serde(flatten)]
+    coefficients: &'a DrillCoefficients,
+}
+
+#[derive(Serialize)]
+struct Chisel<'a> {
+    #[serde(flatten)]
+    predicted: Option<ChiselPredicted<'a>>,
+    left_out_because: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct ChiselPredicted<'a> {
+    #[serde(flatten)]
+    part: PartForces<'a>,
+    half_length_mm: f64,
+    rake_deg: f64,
+    indentation_radius_mm: f64,
+    indentation_thrust_n: f64,
+}
+
+impl<'a> Chisel<'a> {
+    fn of(chisel: &'a std::result::Result<ChiselShare, String>, drill: &DrillPrediction) -> Self {
+        let predicted = chisel.as_ref().ok().map(|chisel| ChiselPredicted {
+            part: PartForces {
+                forces: &chisel.forces,
+                coefficients: &chisel.coefficients,
+            },
+            half_length_mm: drill.drill.chisel_mm,
+            rake_deg: chisel.rake_rad.to_degrees(),
+            indentation_radius_mm: chisel.indentation_radius_mm,
+            indentation_thrust_n: chisel.indentation_thrust_n,
+        });
+        Chisel {
+            predicted,
+            left_out_because: chisel.as_ref().err().map(String::as_str),
         }
-        Err(reason) => json!({ "left_out_because": reason }),
-    });
-    let total = drill.total();
-    json!({
-        "feed_per_rev_mm": drill.feed_per_rev_mm,
-        "inner_radius_mm": drill.inner_radius_mm,
-        "thrust_n": total.thrust_n,
-        "torque_nm": total.torque_nm,
-        "lips": forces(&drill.lips, &drill.lip_coefficients),
-        "chisel": chisel,
-        "elements": drill.elements.iter().map(element).collect::<Vec<_>>(),
-    })
+    }
+}
+
+/// A stretch of the lip.
+#[derive(Serialize)]
+struct Element {
+    radius_mm: f64,
+    rake_deg: f64,
+    inclination_deg: f64,
+    chip_mm: f64,
+    cutting_speed_m_per_min: f64,
+    ktc_n_per_mm2: f64,
+    krc_n_per_mm2: f64,
+    kac_n_per_mm2: f64,
+}
+
+impl Element {
+    fn of(e: &LipElement) -> Self {
+        let [ktc_n_per_mm2, krc_n_per_mm2, kac_n_per_mm2] = e.coefficients_n_per_mm2;
+        Element {
+            radius_mm: e.place.radius_mm,
+            rake_deg: e.place.rake_rad.to_degrees(),
+            inclination_deg: e.place.inclination_rad.to_degrees(),
+            chip_mm: e.chip_mm,
+            cutting_speed_m_per_min: e.speed_m_per_min,
+            ktc_n_per_mm2,
+            krc_n_per_mm2,
+            kac_n_per_mm2,
+        }
+    }
 }
 
 pub fn text(analysis: &LobeAnalysis) -> String {

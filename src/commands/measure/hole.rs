@@ -1,106 +1,202 @@
 //! What `lobestone lobes` says of the hole itself.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
-use crate::analysis::{LobeAnalysis, LobeCase};
+use crate::analysis::{LobeAnalysis, LobeCase, RedundancyAnalysis};
 use crate::campaign::Process;
 use crate::commands::text::{number, table};
+use crate::lobes::drilling::contact::ContactForce;
 use crate::lobes::drilling::hole::{HoleCheck, HoleError, Uncertain};
+use crate::lobes::dynamics::feed_stiffness::FeedStiffness;
+use crate::lobes::optimum::SurfacePoint;
+use crate::robot::pose_compensation::CompensatedPose;
 
-/// An entry of `hole[]`.
-fn entry(posture: Option<&str>, angle_deg: Option<f64>, hole: &HoleError, check: &HoleCheck) -> Value {
-    let (load, tolerance) = (&check.load, &check.tolerance);
-    json!({
-        "posture": posture,
-        "angle_deg": angle_deg,
-        "displacement_mm": hole.displacement_mm,
-        "axial_displacement_mm": hole.axial_mm,
-        "position_error_mm": hole.position_mm.value,
-        "position_error_std_mm": hole.position_mm.std,
-        "position_error_p95_mm": hole.position_mm.upper,
-        "tilt_deg": hole.tilt_deg.value,
-        "tilt_std_deg": hole.tilt_deg.std,
-        "tilt_p95_deg": hole.tilt_deg.upper,
-        "within_position_tolerance": tolerance.position_met(hole),
-        "within_perpendicularity_tolerance": tolerance.perpendicularity_met(hole),
-        "diameter_oversize_mm": hole.oversize_mm.value,
-        "diameter_oversize_std_mm": hole.oversize_mm.std,
-        "diameter_oversize_p95_mm": hole.oversize_mm.upper,
-        "within_diameter_tolerance": tolerance.diameter_met(hole),
-        "compensation": compensation(hole),
-        "contacts": hole.contacts,
-        "skating_mm": hole.skating_mm,
-        "thrust_n": load.thrust_n,
-        "torque_nm": load.torque_nm,
-        "lateral_n": load.lateral_n,
-    })
+/// The hole at one posture.
+#[derive(Serialize)]
+pub(super) struct HoleTold<'a> {
+    posture: Option<&'a str>,
+    angle_deg: Option<f64>,
+    displacement_mm: [f64; 3],
+    axial_displacement_mm: f64,
+    position_error_mm: f64,
+    position_error_std_mm: Option<f64>,
+    position_error_p95_mm: Option<f64>,
+    tilt_deg: f64,
+    tilt_std_deg: Option<f64>,
+    tilt_p95_deg: Option<f64>,
+    within_position_tolerance: bool,
+    within_perpendicularity_tolerance: bool,
+    diameter_oversize_mm: f64,
+    diameter_oversize_std_mm: Option<f64>,
+    diameter_oversize_p95_mm: Option<f64>,
+    within_diameter_tolerance: Option<bool>,
+    compensation: Option<Compensation<'a>>,
+    contacts: &'a [ContactForce],
+    skating_mm: Option<f64>,
+    thrust_n: f64,
+    torque_nm: f64,
+    lateral_n: f64,
 }
 
-/// The pose to command instead; null where there is none.
-fn compensation(hole: &HoleError) -> Value {
-    let Some(Ok(pose)) = &hole.compensation else {
-        return Value::Null;
-    };
-    json!({
-        "joints_deg": pose.joints_deg,
-        "position_m": pose.position_m,
-        "rpy_deg": pose.rpy_rad.map(f64::to_degrees),
-        "offset_mm": pose.offset_m.map(|m| 1e3 * m),
-        "turn_deg": pose.turn_rad.map(f64::to_degrees),
-        "residual_um": 1e6 * pose.residual_m,
-        "residual_deg": pose.residual_rad.to_degrees(),
-    })
+impl<'a> HoleTold<'a> {
+    /// Of every posture (or angle); empty where the hole is not worked out.
+    pub fn all(analysis: &'a LobeAnalysis) -> Vec<Self> {
+        let Some(Ok(check)) = &analysis.hole else {
+            return Vec::new();
+        };
+        let cases = analysis.cases.iter();
+        cases
+            .filter_map(|case| {
+                Some(Self::of(
+                    case.posture.as_deref(),
+                    case.angle_deg,
+                    case.hole.as_ref()?,
+                    check,
+                ))
+            })
+            .collect()
+    }
+
+    fn of(posture: Option<&'a str>, angle_deg: Option<f64>, hole: &'a HoleError, check: &HoleCheck) -> Self {
+        let (load, tolerance) = (&check.load, &check.tolerance);
+        HoleTold {
+            posture,
+            angle_deg,
+            displacement_mm: hole.displacement_mm,
+            axial_displacement_mm: hole.axial_mm,
+            position_error_mm: hole.position_mm.value,
+            position_error_std_mm: hole.position_mm.std,
+            position_error_p95_mm: hole.position_mm.upper,
+            tilt_deg: hole.tilt_deg.value,
+            tilt_std_deg: hole.tilt_deg.std,
+            tilt_p95_deg: hole.tilt_deg.upper,
+            within_position_tolerance: tolerance.position_met(hole),
+            within_perpendicularity_tolerance: tolerance.perpendicularity_met(hole),
+            diameter_oversize_mm: hole.oversize_mm.value,
+            diameter_oversize_std_mm: hole.oversize_mm.std,
+            diameter_oversize_p95_mm: hole.oversize_mm.upper,
+            within_diameter_tolerance: tolerance.diameter_met(hole),
+            compensation: hole
+                .compensation
+                .as_ref()
+                .and_then(|c| c.as_ref().ok())
+                .map(Compensation::of),
+            contacts: &hole.contacts,
+            skating_mm: hole.skating_mm,
+            thrust_n: load.thrust_n,
+            torque_nm: load.torque_nm,
+            lateral_n: load.lateral_n,
+        }
+    }
 }
 
-/// `feed_stiffness[]`.
-pub fn feed_stiffness(analysis: &LobeAnalysis) -> Value {
-    let entries = analysis.cases.iter().filter_map(|case| {
-        let found = case.feed_stiffness.as_ref()?;
-        let mut entry = json!(found);
-        entry["posture"] = json!(case.posture);
-        entry["angle_deg"] = json!(case.angle_deg);
-        Some(entry)
-    });
-    entries.collect()
+/// The pose to command instead.
+#[derive(Serialize)]
+struct Compensation<'a> {
+    joints_deg: &'a [f64],
+    position_m: [f64; 3],
+    rpy_deg: [f64; 3],
+    offset_mm: [f64; 3],
+    turn_deg: [f64; 3],
+    residual_um: f64,
+    residual_deg: f64,
 }
 
-/// `hole[]` and what it rests on.
-pub fn documents(analysis: &LobeAnalysis) -> (Value, Value) {
-    let basis = match &analysis.hole {
-        None => return (json!([]), Value::Null),
-        Some(Err(reason)) => return (json!([]), json!({ "not_worked_out": reason })),
-        Some(Ok(check)) => check,
-    };
-    let entries = analysis.cases.iter().filter_map(|case| {
-        let hole = case.hole.as_ref()?;
-        Some(entry(case.posture.as_deref(), case.angle_deg, hole, basis))
-    });
-    let said = json!({
-        "source": basis.load.source,
-        "position_tolerance_mm": basis.tolerance.position_mm,
-        "perpendicularity_tolerance_deg": basis.tolerance.perpendicularity_deg,
-        "diameter_tolerance": basis.tolerance.diameter.map(|d| d.name()),
-        "diameter_tolerance_mm": basis.tolerance.diameter.map(|d| d.width_mm),
-        "not_worked_out": Value::Null,
-    });
-    (entries.collect(), said)
+impl<'a> Compensation<'a> {
+    fn of(pose: &'a CompensatedPose) -> Self {
+        Compensation {
+            joints_deg: &pose.joints_deg,
+            position_m: pose.position_m,
+            rpy_deg: pose.rpy_rad.map(f64::to_degrees),
+            offset_mm: pose.offset_m.map(|m| 1e3 * m),
+            turn_deg: pose.turn_rad.map(f64::to_degrees),
+            residual_um: 1e6 * pose.residual_m,
+            residual_deg: pose.residual_rad.to_degrees(),
+        }
+    }
 }
 
-/// `redundancy.hole`.
-pub fn weighing(analysis: &LobeAnalysis) -> Value {
-    let (Some(Ok(check)), Some(found)) = (&analysis.hole, &analysis.redundancy) else {
-        return Value::Null;
-    };
-    let Some(weighed) = &found.hole else {
-        return Value::Null;
-    };
-    let angle_deg = found.recommendation.point.angle_deg;
-    json!({
-        "out_of_tolerance_deg": weighed.out_of_tolerance_deg,
-        "no_angle_within_tolerance": weighed.no_angle_is_good_enough(),
-        "by_depth_alone": weighed.by_depth_alone,
-        "recommended": entry(Some(&found.posture), Some(angle_deg), &weighed.recommended, check),
-    })
+/// What the entries rest on.
+#[derive(Serialize)]
+pub(super) struct HoleBasis<'a> {
+    #[serde(flatten)]
+    tolerances: Option<Tolerances<'a>>,
+    not_worked_out: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct Tolerances<'a> {
+    source: &'a str,
+    position_tolerance_mm: f64,
+    perpendicularity_tolerance_deg: f64,
+    diameter_tolerance: Option<String>,
+    diameter_tolerance_mm: Option<f64>,
+}
+
+impl<'a> HoleBasis<'a> {
+    /// `None` where lobes do not come from the model.
+    pub fn of(analysis: &'a LobeAnalysis) -> Option<Self> {
+        let basis = analysis.hole.as_ref()?;
+        let tolerances = basis
+            .as_ref()
+            .ok()
+            .map(|HoleCheck { load, tolerance }| Tolerances {
+                source: &load.source,
+                position_tolerance_mm: tolerance.position_mm,
+                perpendicularity_tolerance_deg: tolerance.perpendicularity_deg,
+                diameter_tolerance: tolerance.diameter.map(|d| d.name()),
+                diameter_tolerance_mm: tolerance.diameter.map(|d| d.width_mm),
+            });
+        Some(HoleBasis {
+            tolerances,
+            not_worked_out: basis.as_ref().err().map(String::as_str),
+        })
+    }
+}
+
+/// How the hole's tolerances bore on the choice of the angle.
+#[derive(Serialize)]
+pub(super) struct Weighing<'a> {
+    out_of_tolerance_deg: &'a [f64],
+    no_angle_within_tolerance: bool,
+    by_depth_alone: Option<SurfacePoint>,
+    recommended: HoleTold<'a>,
+}
+
+impl<'a> Weighing<'a> {
+    /// `None` where the hole is not worked out.
+    pub fn of(analysis: &'a LobeAnalysis, found: &'a RedundancyAnalysis) -> Option<Self> {
+        let Some(Ok(check)) = &analysis.hole else {
+            return None;
+        };
+        let weighed = found.hole.as_ref()?;
+        let angle_deg = found.recommendation.point.angle_deg;
+        Some(Weighing {
+            out_of_tolerance_deg: &weighed.out_of_tolerance_deg,
+            no_angle_within_tolerance: weighed.no_angle_is_good_enough(),
+            by_depth_alone: weighed.by_depth_alone,
+            recommended: HoleTold::of(Some(&found.posture), Some(angle_deg), &weighed.recommended, check),
+        })
+    }
+}
+
+/// Static stiffness of the tool point at one posture.
+#[derive(Serialize)]
+pub(super) struct StiffnessTold<'a> {
+    posture: Option<&'a str>,
+    angle_deg: Option<f64>,
+    #[serde(flatten)]
+    stiffness: FeedStiffness,
+}
+
+impl<'a> StiffnessTold<'a> {
+    pub fn of(case: &'a LobeCase) -> Option<Self> {
+        Some(StiffnessTold {
+            posture: case.posture.as_deref(),
+            angle_deg: case.angle_deg,
+            stiffness: case.feed_stiffness?,
+        })
+    }
 }
 
 pub fn text(analysis: &LobeAnalysis) -> String {

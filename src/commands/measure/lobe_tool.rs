@@ -1,33 +1,31 @@
 //! `lobestone lobes`: the tool as a beam, and the blocks of a drill.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::analysis::LobeAnalysis;
 use crate::lobes::BlockLobes;
 
-/// The limits of one block alone.
-pub fn block(lobes: &BlockLobes) -> Value {
-    json!({
-        "depth_limit_mm": lobes.curve.depth_limit_mm,
-        "chatter_hz": lobes.curve.chatter_hz,
-        "absolute_limit_mm": lobes.absolute.map(|a| a.depth_mm),
-        "absolute_limit_hz": lobes.absolute.map(|a| a.chatter_hz),
-    })
+/// The tool as a beam, clamped at the holder face.
+#[derive(Serialize)]
+pub(super) struct ToolTold<'a> {
+    segments: usize,
+    length_mm: f64,
+    clamped_bending_hz: &'a [f64],
+    clamped_axial_torsional_hz: &'a [f64],
 }
 
-/// The tool as a beam; null where there is none.
-pub fn document(analysis: &LobeAnalysis) -> Value {
-    let beam = &analysis.tool.beam;
-    if beam.segments.is_empty() {
-        return Value::Null;
+impl<'a> ToolTold<'a> {
+    /// `None` where there is none.
+    pub fn of(analysis: &'a LobeAnalysis) -> Option<Self> {
+        let beam = &analysis.tool.beam;
+        let [bending, axial] = &analysis.tool.clamped_hz;
+        (!beam.segments.is_empty()).then(|| ToolTold {
+            segments: beam.segments.len(),
+            length_mm: 1e3 * beam.length_m(),
+            clamped_bending_hz: bending,
+            clamped_axial_torsional_hz: axial,
+        })
     }
-    let [bending, axial] = &analysis.tool.clamped_hz;
-    json!({
-        "segments": beam.segments.len(),
-        "length_mm": 1e3 * beam.length_m(),
-        "clamped_bending_hz": bending,
-        "clamped_axial_torsional_hz": axial,
-    })
 }
 
 /// What the tool and the blocks of a drill are; empty in milling without a tool.

@@ -1,10 +1,9 @@
 //! `lobestone lobes`: stability lobes of a campaign.
 
-use serde_json::{Value, json};
-
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
+use crate::commands::measure::lobes_document::Document;
 use crate::commands::measure::{drill, hole, lobe_tool};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{files_first, number, table, warnings};
@@ -28,119 +27,10 @@ pub fn run(args: LobesArgs) -> Result<Outcome> {
 fn outcome(campaign: &Campaign) -> Result<Outcome> {
     let analysis = LobeAnalysis::run(campaign)?;
     Ok(Outcome::new(
-        document(&analysis),
+        Document::new(&analysis),
         files_first(&[], &campaign.guesses.all_told()) + &text(&analysis),
         Some(Guide::structure(campaign).lobes()),
     ))
-}
-
-fn document(analysis: &LobeAnalysis) -> Value {
-    let curves: Vec<Value> = analysis
-        .cases
-        .iter()
-        .map(|case| {
-            json!({
-                "posture": case.posture,
-                "angle_deg": case.angle_deg,
-                "spindle_rpm": case.curve.spindle_rpm,
-                "depth_limit_mm": case.curve.depth_limit_mm,
-                "chatter_hz": case.curve.chatter_hz,
-                "depth_p05_mm": case.band.as_ref().map(|b| &b.lower_mm),
-                "depth_p95_mm": case.band.as_ref().map(|b| &b.upper_mm),
-                "absolute_limit_mm": case.absolute.map(|a| a.depth_mm),
-                "absolute_limit_hz": case.absolute.map(|a| a.chatter_hz),
-                "before": case.before.as_ref().map(|before| json!({
-                    "revision": 0,
-                    "effects": [],
-                    "depth_limit_mm": before.curve.depth_limit_mm,
-                    "chatter_hz": before.curve.chatter_hz,
-                    "absolute_limit_mm": before.absolute.map(|a| a.depth_mm),
-                    "absolute_limit_hz": before.absolute.map(|a| a.chatter_hz),
-                })),
-                "lateral": case.by_block.as_ref().map(|b| lobe_tool::block(&b[0])),
-                "axial_torsional": case.by_block.as_ref().map(|b| lobe_tool::block(&b[1])),
-                "whirling": case.whirling,
-                "frf": case.description,
-                "band_hz": [case.band_hz.0, case.band_hz.1],
-            })
-        })
-        .collect();
-    let best: Vec<Value> = analysis
-        .best()
-        .iter()
-        .map(|(case, peak)| {
-            json!({
-                "posture": case.posture,
-                "angle_deg": case.angle_deg,
-                "spindle_rpm": peak.spindle_rpm,
-                "depth_mm": peak.depth_mm,
-                "recommended_depth_mm": peak.lower_quantile_mm,
-                "at_range_end": peak.at_range_end,
-            })
-        })
-        .collect();
-    let absolute = analysis.absolute();
-    let (hole, hole_basis) = hole::documents(analysis);
-    json!({
-        "process": analysis.process,
-        "method": analysis.method,
-        "source": analysis.source,
-        "teeth": analysis.teeth,
-        "ktc_n_per_mm2": analysis.coefficients.ktc_n_per_mm2,
-        "krc_n_per_mm2": analysis.coefficients.krc_n_per_mm2,
-        "kac_n_per_mm2": analysis.coefficients.kac_n_per_mm2,
-        "axial_torsional": analysis.axial_torsional.as_ref().map(|block| json!({
-            "included": block.is_ok(),
-            "left_out_because": block.as_ref().err(),
-        })),
-        "drill": drill::document(analysis),
-        "flank_damping": analysis.flank_damping.map(|d| json!({
-            "lateral_n_per_m2": d.lateral_n_per_m2,
-            "axial_n_per_m2": d.axial_n_per_m2,
-        })),
-        "hole_width_mm": analysis.drilled.map(|hole| hole.width_mm),
-        "tool": lobe_tool::document(analysis),
-        "revision": analysis.revision,
-        "effects": analysis.effects,
-        "curves": curves,
-        "absolute_limit_mm": absolute.map(|a| a.depth_mm),
-        "absolute_limit_hz": absolute.map(|a| a.chatter_hz),
-        "best": best,
-        "outcomes": analysis.outcomes,
-        "hole": hole,
-        "hole_basis": hole_basis,
-        "feed_stiffness": hole::feed_stiffness(analysis),
-        "redundancy": analysis.redundancy.as_ref().map(|found| redundancy(found, hole::weighing(analysis))),
-        "warnings": analysis.warnings,
-    })
-}
-
-fn redundancy(found: &RedundancyAnalysis, hole: Value) -> Value {
-    let r = &found.recommendation;
-    json!({
-        "posture": found.posture,
-        "step_deg": found.step_deg,
-        "angles": found.angles,
-        "recommended": {
-            "spindle_rpm": r.point.spindle_rpm,
-            "angle_deg": r.point.angle_deg,
-            "depth_mm": r.point.depth_mm,
-            "speed_margin": r.speed_margin,
-            "recommended_depth_mm": r.lower_quantile_mm,
-            "tip_depth_mm": r.tip_depth_mm,
-            "absolute_limit_mm": r.absolute_limit.map(|a| a.depth_mm),
-            "joints_deg": r.posture.joints_deg,
-            "limit_margin_deg": r.posture.limit_margin_deg,
-            "singularity_margin": r.posture.singularity_margin,
-            "elbow_deg": r.posture.elbow_deg,
-        },
-        "elbows": found.elbows,
-        "hole": hole,
-        "enumeration": r.enumeration,
-        "swarm": r.swarm,
-        "agree": r.agree,
-        "difference": r.difference,
-    })
 }
 
 fn redundancy_text(found: &RedundancyAnalysis) -> String {
@@ -364,6 +254,7 @@ mod tests {
     use super::*;
     use crate::campaign::{Dynamometer, LobeAxis, LobeMode, LobeSource, LobesSection};
     use approx::assert_relative_eq;
+    use serde_json::Value;
 
     fn campaign(source: LobeSource) -> Campaign {
         let mode = |axis, frequency_hz, damping_ratio, stiffness_n_per_m| LobeMode {

@@ -4,20 +4,20 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use serde_json::json;
 
 use crate::analysis::modes::modal::FrfReading;
 use crate::analysis::modes::operational;
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
 use crate::commands::Outcome;
-use crate::commands::measure::modal_files::Files;
+use crate::commands::measure::modal_document::Document;
+use crate::commands::measure::modal_files::{self, Files};
 use crate::commands::next_step::{self, Guide};
 use crate::commands::text::{Emphasis, files_first, said_once, table};
 use crate::data::Quantity;
 use crate::modal::chosen::Choice;
 use crate::modal::operational::OperationalSettings;
-use crate::modal::{Estimator, FrfMode, Method, Settings, TapSettings, Tolerances};
+use crate::modal::{Estimator, Method, Settings, TapSettings, Tolerances};
 use crate::text::hertz;
 use crate::{InputError, Result};
 
@@ -229,10 +229,13 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
         without_hz: args.without.clone(),
         modes: args.modes,
     })?;
-    let mut json = document(&analysis, campaign);
     let mut said = files_first(&[], guessed.as_slice()) + &text(&analysis, args.each);
-    crate::commands::measure::modal_files::write(&args.files(), &analysis, &mut json, &mut said)?;
-    Ok(Outcome::new(json, said, Some(next)))
+    let files = modal_files::write(&args.files(), &analysis, &mut said)?;
+    Ok(Outcome::new(
+        Document::new(&analysis, campaign, &files),
+        said,
+        Some(next),
+    ))
 }
 
 impl ModalArgs {
@@ -267,114 +270,10 @@ fn output_only(args: &ModalArgs, folder: bool) -> Result<Outcome> {
     let found = sets.iter().map(|s| s.modes.modes.len()).sum();
     let paths: Vec<&Path> = args.paths.iter().map(PathBuf::as_path).collect();
     Ok(Outcome::new(
-        crate::commands::measure::operational::document(&sets),
+        crate::commands::measure::operational::Document::new(&sets),
         crate::commands::measure::operational::text(&sets),
         Some(next_step::modes_of_files(&paths, found)),
     ))
-}
-
-/// The answers of all methods for a mode, the recommended one marked.
-fn estimates(mode: &FrfMode) -> impl Iterator<Item = serde_json::Value> + '_ {
-    mode.estimates.iter().map(|estimate| {
-        let mut value = json!(estimate);
-        value["recommended"] = json!(estimate.method == mode.recommended);
-        if estimate.method == mode.recommended {
-            value["reason"] = json!(mode.reason);
-            value["disturbance"] = json!(mode.disturbance);
-        }
-        value
-    })
-}
-
-fn document(analysis: &ModalAnalysis, campaign: bool) -> serde_json::Value {
-    // The set is a posture in a campaign, else a file.
-    let set_key = if campaign { "posture" } else { "file" };
-    let mut frfs = Vec::new();
-    let mut global = Vec::new();
-    let mut rejected = Vec::new();
-    let mut sets = Vec::new();
-    for set in &analysis.sets {
-        for frf in &set.frfs {
-            let modes: Vec<_> = frf.modes.modes.iter().flat_map(estimates).collect();
-            frfs.push(json!({
-                "name": frf.input.name,
-                set_key: set.set,
-                "modes": modes,
-                "warnings": frf.modes.warnings.iter().chain(&frf.modes.remarks).collect::<Vec<_>>(),
-                "quality": frf.quality,
-            }));
-        }
-        for mode in &set.global.modes {
-            let mut value = json!(mode);
-            value[set_key] = json!(set.set);
-            let shape: Vec<_> = mode
-                .shape
-                .iter()
-                .map(|(dof, z)| {
-                    let name = match set.dofs.is_empty() {
-                        true => set.frfs.get(*dof).map(|f| &f.input.name),
-                        false => set.dofs.get(*dof),
-                    };
-                    json!({ "dof": name, "re": z.re, "im": z.im })
-                })
-                .collect();
-            value["shape"] = json!(shape);
-            let constants = set.frfs.iter().zip(&mode.constants);
-            value["modal_constants"] = constants
-                .filter_map(|(frf, c)| {
-                    let (value, std) = (*c)?;
-                    Some(json!({ "frf": frf.input.name, "re_per_kg": value.re, "im_per_kg": value.im, "std_per_kg": std }))
-                })
-                .collect();
-            global.push(value);
-        }
-        for pole in &set.global.rejected {
-            let mut value = json!(pole);
-            value[set_key] = json!(set.set);
-            rejected.push(value);
-        }
-        sets.push(json!({
-            set_key: set.set,
-            "verdict": set.verdict,
-            "why": set.why,
-            "quality": set.global.quality,
-            "sine_lines": set.global.sine_lines,
-            "mac": set.global.mac,
-            "stabilisation": set.global.stabilisation,
-        }));
-    }
-    let hits: Vec<_> = analysis
-        .hits
-        .iter()
-        .map(|(file, hits)| json!({ "file": file, "hits": hits }))
-        .collect();
-    let tracked: Vec<_> = analysis
-        .tracks()
-        .iter()
-        .map(|track| {
-            let modes = analysis.sets.iter().zip(&track.mode_of_set).map(|(set, mode)| {
-                let mode = (*mode).map(|k| &set.global.modes[k]);
-                json!({
-                    set_key: set.set,
-                    "frequency_hz": mode.map(|m| m.frequency_hz),
-                    "frequency_std_hz": mode.map(|m| m.frequency_std_hz),
-                    "damping_ratio": mode.map(|m| m.damping_ratio),
-                    "damping_std": mode.map(|m| m.damping_std),
-                })
-            });
-            json!({ "modes": modes.collect::<Vec<_>>() })
-        })
-        .collect();
-    json!({
-        "frfs": frfs,
-        "global": global,
-        "rejected": rejected,
-        "quality": analysis.quality(),
-        "sets": sets,
-        "tracked": tracked,
-        "hits": hits,
-        "warnings": analysis.warnings,
-    })
 }
 
 /// One row a mode, one column a set.

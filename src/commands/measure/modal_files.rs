@@ -3,15 +3,15 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::analysis::ModalAnalysis;
-use crate::analysis::modes::modal_export::{export, scaled_modes};
+use crate::analysis::modes::modal_export::export;
 use crate::analysis::modes::shape_comparison::{ShapeComparison, compare};
 use crate::campaign::Campaign;
 use crate::commands::text::table;
 use crate::ingest::read_geometry;
-use crate::report::modal_page::{self, Extras, driving_points};
+use crate::report::modal_page::{self, Extras};
 use crate::revision::{Side, files_fingerprint, fingerprint};
 use crate::text::shell_word;
 use crate::{InputError, Result};
@@ -62,16 +62,34 @@ impl Files<'_> {
     }
 }
 
-/// Adds driving points and modal masses to the document, writes what is asked for, and says so.
-pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &mut String) -> Result<()> {
-    scales(analysis, json);
+/// What came of the request; what nobody asked for is left out.
+#[derive(Serialize)]
+pub struct FilesWritten {
+    /// By set; null where nothing could be compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    model: Option<Vec<Option<ShapeComparison>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    exported: Option<Vec<PathBuf>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<ReportWritten>,
+}
+
+#[derive(Serialize)]
+struct ReportWritten {
+    html: PathBuf,
+    images: Vec<PathBuf>,
+}
+
+/// Writes what is asked for, and says so.
+pub fn write(files: &Files, analysis: &ModalAnalysis, said: &mut String) -> Result<FilesWritten> {
     let geometry = files
         .geometry
         .map(read_geometry)
         .transpose()?
         .map(|found| found.0);
-    let mut comparisons: Vec<Option<ShapeComparison>> = Vec::new();
+    let mut model: Option<Vec<Option<ShapeComparison>>> = None;
     if let Some(path) = files.model {
+        let mut comparisons = Vec::new();
         let (nodes, shapes) = read_geometry(path)?;
         if shapes.is_empty() {
             return Err(InputError::new("a model without mode shapes (dataset 55)")
@@ -93,13 +111,15 @@ pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &m
             }
             comparisons.push(comparison);
         }
-        json["model"] = json!(comparisons);
+        model = Some(comparisons);
     }
+    let mut exported = None;
     if let Some(folder) = files.export {
         let written = export(&analysis.sets, geometry.as_ref(), folder)?;
         let _ = writeln!(said, "export   {} files in {}", written.len(), folder.display());
-        json["exported"] = json!(written);
+        exported = Some(written);
     }
+    let mut report = None;
     if let Some(folder) = files.report {
         let fingerprint = match files.inputs {
             [dir] if dir.is_dir() => Campaign::load(dir).and_then(|c| fingerprint(&c, Side::Structure)),
@@ -110,7 +130,7 @@ pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &m
             // The page is worth having without it.
             fingerprint: fingerprint.ok(),
             geometry: geometry.as_ref(),
-            comparisons,
+            comparisons: model.as_deref().unwrap_or_default(),
             command: files.command(),
         };
         let first = files.inputs.first().and_then(|p| p.file_name());
@@ -124,34 +144,16 @@ pub fn write(files: &Files, analysis: &ModalAnalysis, json: &mut Value, said: &m
             written.html.display(),
             written.images.len()
         );
-        json["report"] = json!({ "html": written.html, "images": written.images });
+        report = Some(ReportWritten {
+            html: written.html,
+            images: written.images,
+        });
     }
-    Ok(())
-}
-
-fn scales(analysis: &ModalAnalysis, json: &mut Value) {
-    let mut row = 0;
-    for (k, set) in analysis.sets.iter().enumerate() {
-        json["sets"][k]["driving_points"] = json!(driving_points(set));
-        for scale in scaled_modes(set) {
-            if let Some(scale) = scale {
-                let name = |dof: usize| set.dofs.get(dof).cloned().unwrap_or_default();
-                let mut value = json!({
-                    "driving_point": name(scale.driving_dof),
-                    "modal_mass_kg": scale.modal_mass_kg,
-                    "modal_mass_std_kg": scale.modal_mass_std_kg,
-                    "modal_a_re_kg_per_s": scale.modal_a.re,
-                    "modal_a_im_kg_per_s": scale.modal_a.im,
-                });
-                let unity = scale.unity_mass.iter().zip(&scale.real_normal);
-                value["unity_mass_shape"] = unity
-                    .map(|((dof, z), (_, real))| json!({ "dof": name(*dof), "re": z.re, "im": z.im, "real_normal": real }))
-                    .collect();
-                json["global"][row]["scale"] = value;
-            }
-            row += 1;
-        }
-    }
+    Ok(FilesWritten {
+        model,
+        exported,
+        report,
+    })
 }
 
 fn pairs(set: &str, found: &ShapeComparison) -> String {

@@ -2,10 +2,13 @@
 
 use std::fmt::Write;
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::analysis::modes::operational::OperationalSet;
 use crate::commands::text::warnings;
+use crate::modal::RejectedMode;
+use crate::modal::operational::{Harmonic, OperationalMode};
+use crate::modal::stabilisation::DiagramPole;
 use crate::report::number::with_error;
 
 /// Poles that are not taken, shown to a person; all are in the JSON.
@@ -13,38 +16,98 @@ const MOST_REJECTED: usize = 6;
 /// Lines of rotating parts, likewise, the strongest.
 const MOST_LINES: usize = 12;
 
-pub fn document(sets: &[OperationalSet]) -> Value {
-    let of_set = |set: &OperationalSet| {
+/// What `modal --output-only` found.
+#[derive(Serialize)]
+pub(super) struct Document<'a> {
+    output_only: Vec<Set<'a>>,
+    warnings: Vec<&'a String>,
+}
+
+impl<'a> Document<'a> {
+    pub fn new(sets: &'a [OperationalSet]) -> Self {
+        Document {
+            output_only: sets.iter().map(Set::of).collect(),
+            warnings: sets.iter().flat_map(|s| &s.warnings).collect(),
+        }
+    }
+}
+
+/// The modes of one record.
+#[derive(Serialize)]
+struct Set<'a> {
+    file: &'a str,
+    channels: &'a [String],
+    length_s: f64,
+    modes: Vec<Mode<'a>>,
+    harmonics: &'a [Harmonic],
+    rejected: &'a [RejectedMode],
+    stabilisation: Poles<'a>,
+    sample_rate_hz: f64,
+    segments: usize,
+    longest_lag_s: f64,
+}
+
+/// Poles of all orders.
+#[derive(Serialize)]
+struct Poles<'a> {
+    max_order: usize,
+    poles: &'a [DiagramPole],
+}
+
+impl<'a> Set<'a> {
+    fn of(set: &'a OperationalSet) -> Self {
         let found = &set.modes;
-        let modes: Vec<Value> = found
-            .modes
-            .iter()
-            .map(|mode| {
-                let mut value = json!(mode);
-                let shape = set.channels.iter().zip(&mode.shape);
-                value["shape"] = shape
-                    .map(|(channel, z)| json!({ "channel": channel, "re": z.re, "im": z.im }))
-                    .collect();
-                value
-            })
-            .collect();
-        json!({
-            "file": set.file,
-            "channels": set.channels,
-            "length_s": set.length_s,
-            "modes": modes,
-            "harmonics": found.harmonics,
-            "rejected": found.rejected,
-            "stabilisation": { "max_order": found.max_order, "poles": found.poles },
-            "sample_rate_hz": found.sample_rate_hz,
-            "segments": found.segments,
-            "longest_lag_s": found.longest_lag_s,
-        })
-    };
-    json!({
-        "output_only": sets.iter().map(of_set).collect::<Vec<_>>(),
-        "warnings": sets.iter().flat_map(|s| &s.warnings).collect::<Vec<_>>(),
-    })
+        Set {
+            file: &set.file,
+            channels: &set.channels,
+            length_s: set.length_s,
+            modes: found
+                .modes
+                .iter()
+                .map(|mode| Mode::of(mode, &set.channels))
+                .collect(),
+            harmonics: &found.harmonics,
+            rejected: &found.rejected,
+            stabilisation: Poles {
+                max_order: found.max_order,
+                poles: &found.poles,
+            },
+            sample_rate_hz: found.sample_rate_hz,
+            segments: found.segments,
+            longest_lag_s: found.longest_lag_s,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Mode<'a> {
+    #[serde(flatten)]
+    mode: &'a OperationalMode,
+    shape: Vec<ChannelPart<'a>>,
+}
+
+/// One channel of a shape whose largest component is 1.
+#[derive(Serialize)]
+struct ChannelPart<'a> {
+    channel: &'a str,
+    re: f64,
+    im: f64,
+}
+
+impl<'a> Mode<'a> {
+    fn of(mode: &'a OperationalMode, channels: &'a [String]) -> Self {
+        let shape = channels.iter().zip(&mode.shape);
+        Mode {
+            mode,
+            shape: shape
+                .map(|(channel, z)| ChannelPart {
+                    channel,
+                    re: z.re,
+                    im: z.im,
+                })
+                .collect(),
+        }
+    }
 }
 
 pub fn text(sets: &[OperationalSet]) -> String {

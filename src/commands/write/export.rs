@@ -1,9 +1,9 @@
 //! `lobestone export DIR`: what a campaign measured and what became of it, as files for other programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use serde_json::json;
+use serde::Serialize;
 
 use crate::analysis::Workbench;
 use crate::analysis::export::{ExportForm, ExportPart, exported};
@@ -109,11 +109,11 @@ pub fn run(args: ExportArgs) -> Result<Outcome> {
                 }
             }
             if made.len() == before {
-                left_out.push(json!({
-                    "what": part,
-                    "format": format.ending(),
-                    "why": "universal files have no dataset for it",
-                }));
+                left_out.push(PartLeftOut {
+                    what: part,
+                    format: format.ending(),
+                    why: "universal files have no dataset for it",
+                });
             }
         }
     }
@@ -133,20 +133,46 @@ pub fn run(args: ExportArgs) -> Result<Outcome> {
             vec![part.name().into(), path.display().to_string(), kilobytes]
         })
         .collect();
-    let json = json!({
-        "out": args.out,
-        "files": made.iter().map(|(part, format, path, _)| json!({
-            "what": part,
-            "format": format.ending(),
-            "path": path,
-        })).collect::<Vec<_>>(),
-        "left_out": left_out,
-        "warnings": found.warnings,
-    });
+    let files = made.iter();
+    let document = Document {
+        out: &args.out,
+        files: files
+            .map(|(part, format, path, _)| FileExported {
+                what: *part,
+                format: format.ending(),
+                path,
+            })
+            .collect(),
+        left_out,
+        warnings: &found.warnings,
+    };
     let next = format!("open {}: units are in the names", args.out.display());
     Ok(Outcome::new(
-        json,
+        document,
         table(&["what", "file", "kB"], &rows) + &warnings(&found.warnings),
         Some(next),
     ))
+}
+
+/// What `export` wrote.
+#[derive(Serialize)]
+struct Document<'a> {
+    out: &'a Path,
+    files: Vec<FileExported<'a>>,
+    left_out: Vec<PartLeftOut>,
+    warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct FileExported<'a> {
+    what: ExportPart,
+    format: &'static str,
+    path: &'a Path,
+}
+
+#[derive(Serialize)]
+struct PartLeftOut {
+    what: ExportPart,
+    format: &'static str,
+    why: &'static str,
 }

@@ -1,6 +1,6 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::analysis::CampaignFindings;
 use crate::campaign::Campaign;
@@ -52,16 +52,17 @@ pub fn run(args: ReportArgs) -> Result<Outcome> {
     page.without_scripts = args.without_scripts;
     let files = campaign::write(&page, &findings, &folder)?;
     let missing = findings.errors();
-    let mut json = document(&files);
-    json["missing"] = json!(missing);
-    let missing: Vec<String> = missing
-        .into_iter()
+    let untold: Vec<String> = missing
+        .iter()
         .map(|e| format!("a part is missing from the report: {e}"))
         .collect();
     let next = Guide::structure(&campaign).reported(&files.html, missing_effect(&findings).as_deref());
     Ok(Outcome::new(
-        json,
-        describe(&files) + &warnings(&missing),
+        Document {
+            files: FilesOfReport::of(&files),
+            missing: &missing,
+        },
+        describe(&files) + &warnings(&untold),
         Some(next),
     ))
 }
@@ -74,13 +75,32 @@ fn missing_effect(findings: &CampaignFindings<'_>) -> Option<String> {
     of_structure.or_else(|| cutting.and_then(|d| d.diagnosis.winner().map(EffectCandidate::label)))
 }
 
-/// `html`, `images` and, where they were built in, `tables`.
-pub fn document(files: &ReportFiles) -> Value {
-    let mut json = json!({ "html": files.html, "images": files.images });
-    if cfg!(feature = "parquet") {
-        json["tables"] = json!(files.tables);
+/// What `report` wrote.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    files: FilesOfReport<'a>,
+    missing: &'a [String],
+}
+
+/// The page and what belongs to it.
+#[derive(Serialize)]
+pub(crate) struct FilesOfReport<'a> {
+    html: &'a Path,
+    images: &'a [PathBuf],
+    /// Where they were built in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tables: Option<&'a [PathBuf]>,
+}
+
+impl<'a> FilesOfReport<'a> {
+    pub fn of(files: &'a ReportFiles) -> Self {
+        FilesOfReport {
+            html: &files.html,
+            images: &files.images,
+            tables: cfg!(feature = "parquet").then_some(&files.tables),
+        }
     }
-    json
 }
 
 fn describe(files: &ReportFiles) -> String {

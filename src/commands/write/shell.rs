@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap_complete::Shell;
-use serde_json::json;
+use serde::Serialize;
 
 use crate::commands::outcome::Outcome;
 use crate::files::write_atomically;
@@ -36,8 +36,11 @@ pub fn completions(args: CompletionArgs, mut command: clap::Command) -> Result<O
     clap_complete::generate(args.shell, &mut command, "lobestone", &mut script);
     let script = String::from_utf8_lossy(&script).into_owned();
     Ok(Outcome::new(
-        json!({ "shell": args.shell.to_string(), "script": script }),
-        script,
+        Script {
+            shell: args.shell.to_string(),
+            script: &script,
+        },
+        script.clone(),
         None,
     ))
 }
@@ -49,7 +52,11 @@ pub fn man(args: ManArgs, command: clap::Command) -> Result<Outcome> {
     let pages = pages(command)?;
     let Some(dir) = args.out else {
         let (name, page) = pages.into_iter().next().unwrap_or_default();
-        return Ok(Outcome::new(json!({ "name": name, "page": page }), page, None));
+        let document = ManualPage {
+            name: &name,
+            page: &page,
+        };
+        return Ok(Outcome::new(document, page.clone(), None));
     };
     std::fs::create_dir_all(&dir).map_err(|e| Error::io(&dir, e))?;
     let mut files = Vec::new();
@@ -59,10 +66,34 @@ pub fn man(args: ManArgs, command: clap::Command) -> Result<Outcome> {
         files.push(file);
     }
     Ok(Outcome::new(
-        json!({ "dir": dir, "files": files }),
+        ManualPages {
+            dir: &dir,
+            files: &files,
+        },
         format!("{} manual pages in {}\n", files.len(), dir.display()),
         Some(format!("run `man {}`", first_page(&dir).display())),
     ))
+}
+
+/// What `completions` prints.
+#[derive(Serialize)]
+struct Script<'a> {
+    shell: String,
+    script: &'a str,
+}
+
+/// What `man` prints.
+#[derive(Serialize)]
+struct ManualPage<'a> {
+    name: &'a str,
+    page: &'a str,
+}
+
+/// What `man --out` writes.
+#[derive(Serialize)]
+struct ManualPages<'a> {
+    dir: &'a Path,
+    files: &'a [PathBuf],
 }
 
 fn first_page(dir: &Path) -> PathBuf {

@@ -1,7 +1,7 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use serde_json::json;
+use serde::Serialize;
 
 use crate::commands::{Outcome, next_step};
 use crate::ingest::Quantity;
@@ -157,15 +157,24 @@ pub fn run(args: SimulateArgs) -> Result<Outcome> {
     let records = lab.files.iter().filter(|f| f.0.starts_with(&folder)).count();
     let dir = written.dir.display();
     Ok(Outcome::new(
-        json!({
-            "dir": written.dir,
-            "truth": written.truth,
-            "seed": args.seed,
-            "files": lab.files.iter().map(|f| &f.0).collect::<Vec<_>>(),
-        }),
+        Document {
+            dir: &written.dir,
+            truth: &written.truth,
+            seed: args.seed,
+            files: lab.files.iter().map(|(path, _)| path).collect(),
+        },
         format!("{dir}: a simulated campaign, {records} {kind} files\n"),
         Some(next_step::simulated(&written.dir, &written.truth)),
     ))
+}
+
+/// What `simulate` wrote.
+#[derive(Serialize)]
+struct Document<'a> {
+    dir: &'a Path,
+    truth: &'a Path,
+    seed: u64,
+    files: Vec<&'a String>,
 }
 
 fn force_scenario(args: &SimulateArgs) -> Result<ForceScenario> {

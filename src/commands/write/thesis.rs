@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use serde_json::json;
+use serde::Serialize;
 
 use crate::Result;
 use crate::commands::Outcome;
@@ -23,17 +23,39 @@ pub struct ThesisArgs {
 
 pub fn run(args: ThesisArgs) -> Result<Outcome> {
     let findings = ThesisFindings::run()?;
-    let mut json = json!(findings.study);
-    let next = match args.out {
+    let written = match &args.out {
         Some(folder) => {
-            let written = thesis_section::page(&findings).write(&folder)?;
-            json["html"] = json!(written.html);
-            json["images"] = json!(written.images);
-            Some(format!("open {} in a browser", written.html.display()))
+            let page = thesis_section::page(&findings).write(folder)?;
+            Some(PageWritten {
+                html: page.html,
+                images: page.images,
+            })
         }
         None => None,
     };
-    Ok(Outcome::new(json, describe(&findings.study), next))
+    let next = written
+        .as_ref()
+        .map(|page| format!("open {} in a browser", page.html.display()));
+    let document = Document {
+        study: &findings.study,
+        written,
+    };
+    Ok(Outcome::new(document, describe(&findings.study), next))
+}
+
+/// The case study, and its page where one was asked for.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    study: &'a CaseStudy,
+    #[serde(flatten)]
+    written: Option<PageWritten>,
+}
+
+#[derive(Serialize)]
+struct PageWritten {
+    html: PathBuf,
+    images: Vec<PathBuf>,
 }
 
 fn optional(value: Option<f64>) -> String {

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value, json};
-
 use crate::Result;
 use crate::cutting::fit::estimate::{CfcOptions, CoefficientEstimate, RegressionMethod, bootstrap, estimate};
 use crate::cutting::fit::outlier::studentized;
@@ -283,61 +281,6 @@ impl ForceGroup {
     pub fn is_complete(&self) -> bool {
         self.coefficients.iter().all(|c| c.value.is_some())
     }
-
-    /// A group as docs/json.md has it.
-    pub fn to_json(&self) -> Value {
-        let mut map = Map::new();
-        map.insert("process".into(), json!(self.process));
-        map.insert("material".into(), json!(self.material));
-        map.insert(
-            "cutting_speed_m_per_min".into(),
-            json!(self.cutting_speed_m_per_min),
-        );
-        map.insert(
-            "cutting_speed_range_m_per_min".into(),
-            json!(self.cutting_speed_range_m_per_min),
-        );
-        map.insert("cuts".into(), json!(self.cuts));
-        map.insert("feeds".into(), json!(self.feeds));
-        for c in &self.coefficients {
-            let mut entry = json!({
-                "value": c.value, "std_error": c.std_error, "std_error_bootstrap": c.std_error_bootstrap,
-            });
-            if let Some(other) = c.other_method {
-                let key = match self.method {
-                    RegressionMethod::LeastSquares => "huber",
-                    RegressionMethod::Huber => "least_squares",
-                };
-                entry[key] = json!(other);
-            }
-            if c.constraint_active {
-                entry["constraint_active"] = json!(true);
-                entry["unconstrained"] = json!(c.unconstrained);
-            }
-            map.insert(c.key.into(), entry);
-        }
-        map.insert("method".into(), json!(self.method));
-        map.insert("influence".into(), json!(self.influence));
-        map.insert("inseparable".into(), json!(self.inseparable));
-        map.insert("r2".into(), by_axis(self.process, &self.r2));
-        map.insert("chi2_per_dof".into(), by_axis(self.process, &self.chi2_per_dof));
-        map.insert(
-            "extra_scatter".into(),
-            by_axis(self.process, &self.extra_scatter.map(Some)),
-        );
-        map.insert("points".into(), json!(self.points));
-        Value::Object(map)
-    }
-}
-
-/// `{x, y, z}` and for drilling `mz`; what the process does not use is null.
-pub fn by_axis(process: Process, values: &[Option<f64>; 4]) -> Value {
-    let used = |axis: ForceAxis| values[axis.index()].filter(|_| ForceAxis::of(process).contains(&axis));
-    let mut map = json!({"x": used(ForceAxis::X), "y": used(ForceAxis::Y), "z": used(ForceAxis::Z)});
-    if process == Process::Drilling {
-        map["mz"] = json!(used(ForceAxis::Mz));
-    }
-    map
 }
 
 /// What the ordinary fit says, before constraints and second opinions.

@@ -11,11 +11,10 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde_json::{Map, Value, json};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::cutting::cutting_trials::CuttingTrials;
-use crate::cutting::fit::group::{ForceGroup, KnownValue, by_axis, distinct};
+use crate::cutting::fit::group::{ForceGroup, KnownValue, distinct};
 use crate::cutting::fit::regression::{CoefficientFit, Observation, fit, r2};
 use crate::cutting::force_model::average_force::{average_row, feed_mm};
 use crate::cutting::force_model::force_axis::ForceAxis;
@@ -27,13 +26,16 @@ use crate::data::{CutGeometry, Process, Tool};
 use crate::stop;
 
 /// A force component under Kienzle's law.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct KienzleComponent {
     /// `tangential`, `radial`, `axial` or, of a drill, `feed`.
+    #[serde(rename = "component")]
     pub name: &'static str,
     /// Symbol of the specific force: `kt1.1` is the kc1.1 of the tables.
+    #[serde(skip)]
     pub label: &'static str,
     /// Specific force at b = h = 1 mm, N/mm²; `None` where the data does not determine it.
+    #[serde(rename = "k1_1_n_per_mm2")]
     pub k1_1: Option<KnownValue>,
     /// How the specific force falls with chip thickness; `None` where the data does not determine it.
     pub m: Option<KnownValue>,
@@ -371,32 +373,6 @@ impl KienzleFit {
             }
             None => format!("; cut at least four feeds per {per} over a factor of five"),
         }
-    }
-
-    /// `{components[], converged, r2{}, delta_bic, p_linear_edge, p_kienzle, preferred, measure, reading}`.
-    pub fn to_json(&self) -> Value {
-        let components: Vec<Value> = self
-            .components
-            .iter()
-            .map(|c| {
-                let mut map = Map::new();
-                map.insert("component".into(), json!(c.name));
-                map.insert("k1_1_n_per_mm2".into(), json!(c.k1_1));
-                map.insert("m".into(), json!(c.m));
-                Value::Object(map)
-            })
-            .collect();
-        json!({
-            "components": components,
-            "converged": self.converged,
-            "r2": by_axis(self.process, &self.r2),
-            "delta_bic": self.delta_bic,
-            "p_linear_edge": self.p_linear_edge,
-            "p_kienzle": self.p_kienzle,
-            "preferred": self.preferred,
-            "measure": self.telling,
-            "reading": self.reading(),
-        })
     }
 }
 

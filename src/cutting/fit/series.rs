@@ -1,7 +1,5 @@
 //! All cuts of one process and one material: their coefficients over speed, and against another material.
 
-use serde_json::{Value, json};
-
 use crate::cutting::cutting_trials::CuttingTrials;
 use crate::cutting::fit::group::{Rows, distinct, observations};
 use crate::cutting::fit::trend::{ChangeReading, CoefficientChange, changes, doublings, reference_speed};
@@ -134,13 +132,6 @@ fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
     (size > 0.0).then(|| sum(&|x, y| x * y) / size)
 }
 
-fn change_json(kind: &CoefficientKind, change: &CoefficientChange) -> Value {
-    json!({
-        "coefficient": kind.key, "label": kind.label, "unit": kind.unit,
-        "p_value": change.p_value, "reading": change.reading,
-    })
-}
-
 impl SpeedTrends {
     /// Coefficients that follow the speed by more than chance.
     pub fn found(&self) -> impl Iterator<Item = (&CoefficientKind, &CoefficientChange)> {
@@ -158,46 +149,6 @@ impl SpeedTrends {
             "the faster cuts were made {order} (correlation {correlation:.2}): a trend over speed cannot be told from \
              tool wear; cut the speeds in random order"
         ))
-    }
-
-    /// One entry a coefficient: `{process, material, coefficient, label, unit, reference_speed_m_per_min, value,
-    /// per_doubling, exponent, p_value, reading}`.
-    pub fn to_json(&self) -> Vec<Value> {
-        let kinds = coefficients_of(self.process).iter();
-        kinds
-            .zip(&self.changes)
-            .map(|(kind, change)| {
-                let mut entry = change_json(kind, change);
-                entry["process"] = json!(self.process);
-                entry["material"] = json!(self.material);
-                entry["reference_speed_m_per_min"] = json!(self.reference_speed_m_per_min);
-                entry["value"] = json!(change.reference);
-                entry["per_doubling"] = json!(change.change);
-                entry["exponent"] = json!(change.exponent());
-                entry
-            })
-            .collect()
-    }
-}
-
-impl MaterialComparison {
-    /// One entry a coefficient: `{process, material, reference, coefficient, label, unit, reference_value, difference,
-    /// ratio, p_value, reading}`.
-    pub fn to_json(&self) -> Vec<Value> {
-        let kinds = coefficients_of(self.process).iter();
-        kinds
-            .zip(&self.changes)
-            .map(|(kind, change)| {
-                let mut entry = change_json(kind, change);
-                entry["process"] = json!(self.process);
-                entry["material"] = json!(self.material);
-                entry["reference"] = json!(self.reference);
-                entry["reference_value"] = json!(change.reference);
-                entry["difference"] = json!(change.change);
-                entry["ratio"] = json!(change.ratio);
-                entry
-            })
-            .collect()
     }
 }
 

@@ -27,18 +27,19 @@ pub struct LipElement {
 }
 
 /// What one part of the edge contributes, all lips together.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct DrillForces {
     /// Pushes the drill out of the hole.
     pub thrust_n: f64,
     /// Opposes the rotation.
     pub torque_nm: f64,
     /// Sum over the lips of the force towards the axis; their resultant is zero while the lips are alike.
+    #[serde(skip)]
     pub inward_n: f64,
 }
 
 /// The same as coefficients of the chip's area f/N × width, the width counted along the radius: as `[lobes]` has them, N/mm².
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct DrillCoefficients {
     /// Torque over f (R² − r₀²)/2: tangential.
     pub ktc_n_per_mm2: f64,

@@ -1,8 +1,6 @@
 //! Cutting coefficients predicted from an orthogonal database (Budak, Altintas & Armarego, J. Manuf. Sci. Eng. 118,
 //! 1996; Altintas, Manufacturing Automation, 2nd ed., §2.6): what a chip needs to be sheared, on an oblique edge.
 
-use serde_json::{Value, json};
-
 use crate::cutting::cutting_trials::CuttingTrials;
 use crate::cutting::fit::group::ForceGroup;
 use crate::data::{ChipFormation, Process};
@@ -132,19 +130,6 @@ pub(crate) fn predict(
         ],
         predicted,
     })
-}
-
-impl OrthogonalPrediction {
-    /// `{material, shear_angle_deg, coefficients[]: {label, unit, predicted, value, std_error}}`; value is what the cuts
-    /// gave.
-    pub fn to_json(&self) -> Value {
-        let row = |(label, predicted, value, std_error): &(&str, f64, Option<f64>, Option<f64>)| json!({"label": label, "unit": "N/mm²", "predicted": predicted, "value": value, "std_error": std_error});
-        json!({
-            "material": self.material,
-            "shear_angle_deg": self.predicted.shear_angle_rad.to_degrees(),
-            "coefficients": self.rows.iter().map(row).collect::<Vec<_>>(),
-        })
-    }
 }
 
 #[cfg(test)]

@@ -38,8 +38,10 @@ pub struct FrfError {
     /// Frequency response assurance criterion, 0..1; `None` where model or measurement is zero.
     pub frac: Option<f64>,
     /// One a band of the error map; `None` where nothing was measured.
+    #[serde(skip)]
     pub band_nrms: Vec<Option<f64>>,
     /// The same, error over noise: 1 where only noise is left.
+    #[serde(skip)]
     pub band_times_noise: Vec<Option<f64>>,
     /// The line on which the error stands highest above the noise.
     pub worst_line: Option<WorstLine>,

@@ -1,7 +1,7 @@
 //! What part of a model's residual an added effect takes away, and where.
 
 use num_complex::Complex64;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::data::Point;
 use crate::discrepancy::comparison::error_sums::{BANDS, Sums, band_edges_hz, band_of};
@@ -17,10 +17,13 @@ pub struct Explained {
     #[serde(flatten)]
     pub total: Part,
     /// One a posture.
+    #[serde(serialize_with = "by_name")]
     pub by_posture: Vec<NamedPart>,
     /// Response axis, reference axis: `XX`, `XY`, …
+    #[serde(serialize_with = "by_name")]
     pub by_direction: Vec<NamedPart>,
     /// Node number of the response.
+    #[serde(serialize_with = "by_name")]
     pub by_point: Vec<NamedPart>,
     /// One a band in which something was measured.
     pub by_band: Vec<BandPart>,
@@ -49,13 +52,17 @@ pub struct Part {
 }
 
 /// Values of one name before and after.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NamedPart {
     /// What the group has in common: a posture, a direction, a point.
     pub name: String,
     /// Its values.
-    #[serde(flatten)]
     pub part: Part,
+}
+
+/// An object with a key for each name.
+fn by_name<S: Serializer>(parts: &[NamedPart], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parts.iter().map(|p| (&p.name, p.part)))
 }
 
 /// Values of one frequency band before and after.

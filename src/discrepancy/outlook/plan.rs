@@ -5,7 +5,7 @@
 //! to them, and sqrt(Σ r²/σ²) of what it leaves is the number of standard deviations at which it would be found out.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::Result;
 use crate::data::Posture;
@@ -38,7 +38,16 @@ pub struct PlannedEffect {
     /// Standard deviations after the baseline has taken in what it can.
     pub sigmas: f64,
     /// The size that was assumed: name, value, unit.
+    #[serde(serialize_with = "values_by_name")]
     pub size: Vec<(String, f64, &'static str)>,
+}
+
+/// An object with a number for each name.
+fn values_by_name<S: Serializer>(
+    size: &[(String, f64, &'static str)],
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_map(size.iter().map(|(name, value, _)| (name, value)))
 }
 
 /// Two effects that the plan would not tell apart.

@@ -19,13 +19,14 @@ use crate::lobes::dynamics::frf::{Receptance, ToolPointFrf};
 use crate::lobes::force::RegenerativeForce;
 
 /// Damping per width of cut, the greater the slower the drill turns.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct FlankDamping {
     /// c·Ω/b across the tool, N/m² (N·s/m per m of width, times rad/s).
     pub lateral_n_per_m2: f64,
     /// The same along the tool.
     pub axial_n_per_m2: f64,
     /// Slowest speed that is asked for: sets how closely frequencies are looked at, rpm.
+    #[serde(skip)]
     pub slowest_rpm: f64,
 }
 

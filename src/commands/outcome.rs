@@ -17,7 +17,14 @@ pub struct Outcome {
 impl Outcome {
     /// With the next sensible step: `next_step` in the document, the last line of the text.
     pub fn new(document: impl Serialize, mut text: String, next_step: Option<String>) -> Self {
-        let mut json = serde_json::json!(document);
+        // Only a path that is no Unicode cannot be written as JSON.
+        let (mut json, failed) = match serde_json::to_value(document) {
+            Ok(json) => (json, None),
+            Err(error) => {
+                let why = format!("the document cannot be written as JSON: {error}");
+                (serde_json::Value::Null, Some(crate::Error::computation(why)))
+            }
+        };
         if let Some(step) = next_step.as_ref().filter(|_| !crate::progress::is_silent()) {
             text += &format!("\n{} {step}\n", text::Emphasis::Strong.on("Next:"));
         }
@@ -25,7 +32,7 @@ impl Outcome {
         Outcome {
             json,
             text,
-            failed: None,
+            failed,
         }
     }
 }

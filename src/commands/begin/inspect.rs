@@ -1,7 +1,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::campaign::draft::measurement_files;
 use crate::commands::text::Emphasis;
@@ -92,12 +92,18 @@ struct Document<'a> {
 /// A file and what it is for.
 #[derive(Serialize)]
 struct FileSeen {
+    /// Need not be Unicode: what cannot be written is shown as a replacement character.
+    #[serde(serialize_with = "displayed")]
     path: PathBuf,
     format: String,
     why: String,
     kind: &'static str,
     channels: Vec<Row>,
     warnings: Vec<String>,
+}
+
+fn displayed<S: Serializer>(path: &Path, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_str(&path.display())
 }
 
 /// One channel or FRF, and its cells in the table.

@@ -5,7 +5,7 @@ use crate::analysis::forces::cutting::waveform_groups;
 use crate::analysis::forces::force_records::{cutting_trials, identify_forces};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
-use crate::commands::measure::cfc_document::{Document, PowerLaws};
+use crate::commands::measure::cfc_document::{CfcDocument, PowerLaws};
 use crate::commands::next_step::Guide;
 use crate::commands::text::files_first;
 use crate::commands::{CampaignArg, Outcome};
@@ -47,7 +47,7 @@ pub fn run(args: CfcArgs) -> Result<Outcome> {
         pooled: kienzle(&trials, &result, &result.pooled),
     };
     Ok(Outcome::new(
-        Document::new(&campaign, &result, &waveforms, &power_laws, &setup),
+        CfcDocument::new(&campaign, &result, &waveforms, &power_laws, &setup),
         files_first(&setup, &result.warnings) + &text(&campaign, &result, &power_laws),
         Some(Guide::cutting(&campaign).coefficients()),
     ))

@@ -23,7 +23,7 @@ pub(super) struct PowerLaws {
 }
 
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct CfcDocument<'a> {
     campaign: &'a str,
     groups: Vec<Group<'a>>,
     pooled: Vec<Group<'a>>,
@@ -36,7 +36,7 @@ pub(super) struct Document<'a> {
     warnings: &'a [String],
 }
 
-impl<'a> Document<'a> {
+impl<'a> CfcDocument<'a> {
     pub fn new(
         campaign: &'a Campaign,
         result: &'a CfcResult,
@@ -47,7 +47,7 @@ impl<'a> Document<'a> {
         let groups = result.groups.iter().zip(&power_laws.groups).zip(waveforms);
         let pooled = result.pooled.iter().zip(&power_laws.pooled);
         let process = result.pooled.first().map(|g| g.process);
-        Document {
+        CfcDocument {
             campaign: &campaign.name,
             groups: groups
                 .map(|((group, law), waveform)| Group::of(group, law.as_ref(), Some(waveform.as_ref())))

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::analysis::{LobeAnalysis, RedundancyAnalysis};
 use crate::campaign::{Campaign, LobeMethod, Process};
-use crate::commands::measure::lobes_document::Document;
+use crate::commands::measure::lobes_document::LobesDocument;
 use crate::commands::measure::{drill, hole, lobe_tool};
 use crate::commands::next_step::Guide;
 use crate::commands::text::{files_first, number, table, warnings};
@@ -27,7 +27,7 @@ pub fn run(args: LobesArgs) -> Result<Outcome> {
 fn outcome(campaign: &Campaign) -> Result<Outcome> {
     let analysis = LobeAnalysis::run(campaign)?;
     Ok(Outcome::new(
-        Document::new(&analysis),
+        LobesDocument::new(&analysis),
         files_first(&[], &campaign.guesses.all_told()) + &text(&analysis),
         Some(Guide::structure(campaign).lobes()),
     ))

@@ -17,7 +17,7 @@ use crate::lobes::setup::LobeCoefficients;
 use crate::lobes::{AbsoluteLimit, BlockLobes, LobeCurve, Peak};
 
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct LobesDocument<'a> {
     process: Process,
     method: LobeMethod,
     source: LobeSource,
@@ -43,10 +43,10 @@ pub(super) struct Document<'a> {
     warnings: &'a [String],
 }
 
-impl<'a> Document<'a> {
+impl<'a> LobesDocument<'a> {
     pub fn new(analysis: &'a LobeAnalysis) -> Self {
         let block = analysis.axial_torsional.as_ref();
-        Document {
+        LobesDocument {
             process: analysis.process,
             method: analysis.method,
             source: analysis.source,

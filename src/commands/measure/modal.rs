@@ -10,7 +10,7 @@ use crate::analysis::modes::operational;
 use crate::analysis::{ModalAnalysis, SetModes};
 use crate::campaign::Campaign;
 use crate::commands::Outcome;
-use crate::commands::measure::modal_document::Document;
+use crate::commands::measure::modal_document::ModalDocument;
 use crate::commands::measure::modal_files::{self, Files};
 use crate::commands::next_step::{self, Guide};
 use crate::commands::text::{Emphasis, files_first, said_once, table};
@@ -232,7 +232,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
     let mut said = files_first(&[], guessed.as_slice()) + &text(&analysis, args.each);
     let files = modal_files::write(&args.files(), &analysis, &mut said)?;
     Ok(Outcome::new(
-        Document::new(&analysis, campaign, &files),
+        ModalDocument::new(&analysis, campaign, &files),
         said,
         Some(next),
     ))
@@ -270,7 +270,7 @@ fn output_only(args: &ModalArgs, folder: bool) -> Result<Outcome> {
     let found = sets.iter().map(|s| s.modes.modes.len()).sum();
     let paths: Vec<&Path> = args.paths.iter().map(PathBuf::as_path).collect();
     Ok(Outcome::new(
-        crate::commands::measure::operational::Document::new(&sets),
+        crate::commands::measure::operational::OperationalDocument::new(&sets),
         crate::commands::measure::operational::text(&sets),
         Some(next_step::modes_of_files(&paths, found)),
     ))

@@ -13,7 +13,7 @@ use crate::modal::{Disturbance, FrfMode, GlobalMode, Hit, ModeEstimate, Rejected
 use crate::report::modal_page::driving_points;
 
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct ModalDocument<'a> {
     frfs: Vec<Frf<'a>>,
     global: Vec<Global<'a>>,
     rejected: Vec<Rejected<'a>>,
@@ -26,7 +26,7 @@ pub(super) struct Document<'a> {
     warnings: &'a [String],
 }
 
-impl<'a> Document<'a> {
+impl<'a> ModalDocument<'a> {
     /// `campaign`: a set is a posture; else it is a file.
     pub fn new(analysis: &'a ModalAnalysis, campaign: bool, files: &'a FilesWritten) -> Self {
         let name = |set: &'a SetModes| match campaign {
@@ -35,7 +35,7 @@ impl<'a> Document<'a> {
         };
         let sets = || analysis.sets.iter().map(|set| (set, name(set)));
         let tracks = analysis.tracks();
-        Document {
+        ModalDocument {
             frfs: sets().flat_map(|(set, name)| Frf::of(set, name)).collect(),
             global: sets().flat_map(|(set, name)| Global::of(set, name)).collect(),
             rejected: sets()

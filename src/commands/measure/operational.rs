@@ -18,14 +18,14 @@ const MOST_LINES: usize = 12;
 
 /// What `modal --output-only` found.
 #[derive(Serialize)]
-pub(super) struct Document<'a> {
+pub(super) struct OperationalDocument<'a> {
     output_only: Vec<Set<'a>>,
     warnings: Vec<&'a String>,
 }
 
-impl<'a> Document<'a> {
+impl<'a> OperationalDocument<'a> {
     pub fn new(sets: &'a [OperationalSet]) -> Self {
-        Document {
+        OperationalDocument {
             output_only: sets.iter().map(Set::of).collect(),
             warnings: sets.iter().flat_map(|s| &s.warnings).collect(),
         }

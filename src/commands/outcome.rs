@@ -29,10 +29,6 @@ impl Outcome {
             text += &format!("\n{} {step}\n", text::Emphasis::Strong.on("Next:"));
         }
         json["next_step"] = next_step.into();
-        Outcome {
-            json,
-            text,
-            failed,
-        }
+        Outcome { json, text, failed }
     }
 }

@@ -113,6 +113,42 @@ def receptances(robot, joints_deg, stiffness, damping, f, bodies, young):
     return np.einsum("oi,fi,ji->foj", phi, modal, phi[:3])
 
 
+def write(folder, name, bodies, postures, f, measured, random):
+    """A campaign of the IRB 6640. `measured(number)`: receptances of a posture, as `receptances` has them; noise is put on them."""
+    (folder / "frf").mkdir(parents=True, exist_ok=True)
+    text = f'schema = "lobestone/campaign/1"\nname = "{name}"\n\n[robot]\nmodel = "irb6640"\n'
+    for node, body in enumerate(bodies, 1):
+        text += f'\n[[point]]\nnode = {node}\nbody = "{body}"\nposition_m = [0.0, 0.0, 0.0]\naxes = "base"\n'
+    names = [f"{node}{axis}/1{hit}" for node in range(1, len(bodies) + 1) for axis in "XYZ" for hit in "XYZ"]
+    header = "frequency_hz," + ",".join(f"re({n}),im({n})" for n in names)
+    formats = ["%.2f"] + ["%.4e"] * (2 * len(names))
+    for number, posture in enumerate(postures):
+        h = measured(number)
+        std = np.hypot(0.02 * abs(h), 2e-8)
+        h = h + std * (random.normal(size=h.shape) + 1j * random.normal(size=h.shape)) / np.sqrt(2)
+        columns = [f]
+        for value in h.reshape(len(f), -1).T:
+            columns += [value.real, value.imag]
+        file = f"frf/p{number + 1}.csv"
+        np.savetxt(folder / file, np.array(columns).T, delimiter=",", header=header, comments="", fmt=formats)
+        angles = [float(q) for q in posture]
+        text += f'\n[[posture]]\nid = "p{number + 1}"\njoints_deg = {angles}\n'
+        text += f'\n[[frf]]\nfile = "{file}"\nposture = "p{number + 1}"\nquantity = "receptance"\n'
+    (folder / "campaign.toml").write_text(text)
+
+
+def drawn(random, robot):
+    """Joint stiffnesses within 30 % of the file's, N m/rad, and a damping ratio."""
+    stiffness = np.array([1 / j["compliance_rad_per_nm"] for j in robot["joint"]])
+    return stiffness * np.exp(random.uniform(-0.3, 0.3, 6)), random.uniform(0.02, 0.04)
+
+
+def drawn_postures(random, count):
+    """The tap postures, and others around them, deg."""
+    around = lambda i: np.round(np.array(TAP_POSTURES[i % 2]) + random.uniform(-25, 25, 6), 1)
+    return TAP_POSTURES + [list(around(i)) for i in range(count - 2)]
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("folder", type=pathlib.Path)
@@ -130,35 +166,13 @@ def main():
         robot["link"][1]["section_wall_m"] *= 0.7
     young = 120e9 if asked.kind == "wall" else None
     random = np.random.default_rng(asked.seed)
-    stiffness = np.array([1 / j["compliance_rad_per_nm"] for j in robot["joint"]])
-    stiffness *= np.exp(random.uniform(-0.3, 0.3, 6))
-    damping = random.uniform(0.02, 0.04)
+    stiffness, damping = drawn(random, robot)
     count, step = (4, 0.6) if asked.thin else (6, 0.2)
     bodies = ["tool", "link2", "link4"] if asked.thin else ["tool", "link1", "link2", "link4"]
-    postures = TAP_POSTURES + [
-        list(np.round(np.array(TAP_POSTURES[i % 2]) + random.uniform(-25, 25, 6), 1)) for i in range(count - 2)
-    ]
+    postures = drawn_postures(random, count)
     f = np.arange(3, 90.01, step)
-    (asked.folder / "frf").mkdir(parents=True, exist_ok=True)
-    text = 'schema = "lobestone/campaign/1"\nname = "links"\n\n[robot]\nmodel = "irb6640"\n'
-    for node, body in enumerate(bodies, 1):
-        text += f'\n[[point]]\nnode = {node}\nbody = "{body}"\nposition_m = [0.0, 0.0, 0.0]\naxes = "base"\n'
-    for number, posture in enumerate(postures, 1):
-        h = receptances(robot, posture, stiffness, damping, f, bodies, young)
-        std = np.hypot(0.02 * abs(h), 2e-8)
-        h = h + std * (random.normal(size=h.shape) + 1j * random.normal(size=h.shape)) / np.sqrt(2)
-        names = [f"{node}{axis}/1{hit}" for node in range(1, len(bodies) + 1) for axis in "XYZ" for hit in "XYZ"]
-        columns = [f]
-        for value in h.reshape(len(f), -1).T:
-            columns += [value.real, value.imag]
-        header = "frequency_hz," + ",".join(f"re({n}),im({n})" for n in names)
-        file = asked.folder / f"frf/p{number}.csv"
-        formats = ["%.2f"] + ["%.4e"] * (len(columns) - 1)
-        np.savetxt(file, np.array(columns).T, delimiter=",", header=header, comments="", fmt=formats)
-        angles = [float(q) for q in posture]
-        text += f'\n[[posture]]\nid = "p{number}"\njoints_deg = {angles}\n'
-        text += f'\n[[frf]]\nfile = "frf/p{number}.csv"\nposture = "p{number}"\nquantity = "receptance"\n'
-    (asked.folder / "campaign.toml").write_text(text)
+    measured = lambda number: receptances(robot, postures[number], stiffness, damping, f, bodies, young)
+    write(asked.folder, "links", bodies, postures, f, measured, random)
     print("joint stiffness, N m/rad:", ", ".join(f"{k:.4g}" for k in stiffness), f"damping ratio {damping:.4f}")
 
 

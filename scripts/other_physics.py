@@ -12,7 +12,6 @@ Needs numpy and scipy.
 """
 
 import argparse
-import copy
 import csv
 import json
 import pathlib
@@ -152,28 +151,11 @@ def receptances(kind, size, joints_deg, k, ratio, order):
 
 def write(folder, kind, size, seed):
     random = np.random.default_rng(seed)
-    k = np.array([1 / joint["compliance_rad_per_nm"] for joint in ROBOT["joint"]]) * np.exp(random.uniform(-0.3, 0.3, 6))
-    ratio = random.uniform(0.02, 0.04)
-    taps = link_campaign.TAP_POSTURES
-    postures = taps + [list(np.round(np.array(taps[i % 2]) + random.uniform(-25, 25, 6), 1)) for i in range(4)]
-    text = 'schema = "lobestone/campaign/1"\nname = "other physics"\n\n[robot]\nmodel = "irb6640"\n'
-    for node, body in enumerate(BODIES, 1):
-        text += f'\n[[point]]\nnode = {node}\nbody = "{body}"\nposition_m = [0.0, 0.0, 0.0]\naxes = "base"\n'
-    (folder / "frf").mkdir(parents=True)
-    names = [f"{node}{axis}/1{hit}" for node in range(1, len(BODIES) + 1) for axis in "XYZ" for hit in "XYZ"]
-    header = "frequency_hz," + ",".join(f"re({n}),im({n})" for n in names)
-    for number, joints_deg in enumerate(postures):
-        h = receptances(kind, size, joints_deg, k, ratio, number / (len(postures) - 1))
-        std = np.hypot(0.02 * abs(h), 2e-8)
-        h = h + std * (random.normal(size=h.shape) + 1j * random.normal(size=h.shape)) / np.sqrt(2)
-        parts = [part for column in h.reshape(len(h), -1).T for part in (column.real, column.imag)]
-        file = f"frf/p{number + 1}.csv"
-        formats = ["%.2f"] + ["%.4e"] * len(parts)
-        np.savetxt(folder / file, np.array([FREQUENCY_HZ, *parts]).T, delimiter=",", header=header, comments="", fmt=formats)
-        angles = [float(q) for q in joints_deg]
-        text += f'\n[[posture]]\nid = "p{number + 1}"\njoints_deg = {angles}\n'
-        text += f'\n[[frf]]\nfile = "{file}"\nposture = "p{number + 1}"\nquantity = "receptance"\n'
-    (folder / "campaign.toml").write_text(text)
+    k, ratio = link_campaign.drawn(random, ROBOT)
+    postures = link_campaign.drawn_postures(random, 6)
+    order = lambda number: number / (len(postures) - 1)
+    measured = lambda number: receptances(kind, size, postures[number], k, ratio, order(number))
+    link_campaign.write(folder, "other physics", BODIES, postures, FREQUENCY_HZ, measured, random)
 
 
 def diagnosed(program, folder):
@@ -211,8 +193,11 @@ def main():
                     write(folder, kind, size, asked.seed + 2 * number + (strength == "strong"))
                 found, best = diagnosed(asked.lobestone, folder)
                 # A name and `none` are right where they leave no more than the noise; `unknown` where there is something.
-                left = {"effect": best, "none": found["baseline"]["reduced_chi2"], "unknown": 0 if kind != "none" else 9}
-                right = left[found["verdict"]] < 1.01
+                right = {
+                    "effect": best < 1.01,
+                    "none": found["baseline"]["reduced_chi2"] < 1.01,
+                    "unknown": kind != "none",
+                }[found["verdict"]]
                 row = dict(zip(FIELDS, [kind, strength, size, found["verdict"], found.get("effect"), found.get("site"),
                                         f"{found['confidence']:.2f}", f"{found['baseline']['reduced_chi2']:.3f}",
                                         f"{best:.3f}", right]))  # fmt: skip

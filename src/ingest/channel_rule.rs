@@ -137,8 +137,7 @@ pub fn read_forces_with(path: &Path, rules: &[ChannelRule]) -> Result<ForceFile>
                 return with_rules(path, rules, long.whole()).map(ForceFile::Short);
             }
             let mut told = Vec::new();
-            let mut file = long.forces(|piece| {
-                let mut piece = piece;
+            let mut file = long.forces(|mut piece| {
                 if !rules.is_empty() {
                     let (record, warnings) = forces_by(path, rules, vec![piece])?;
                     piece = record;

@@ -81,7 +81,8 @@ pub(super) fn detect(bytes: &[u8], is_dwd_named: bool) -> Result<(Detected, Form
         ));
     }
     if text::is_binary(bytes) {
-        let (what, remedy) = if is_dwd_named || mentions(bytes, b"DynoWare") || mentions(bytes, b"Kistler") {
+        let head = text::head(bytes);
+        let (what, remedy) = if is_dwd_named || mentions(head, b"DynoWare") || mentions(head, b"Kistler") {
             (
                 "a DynoWare .dwd recording: an undocumented binary format",
                 "in DynoWare: File, Export, with header, as text",

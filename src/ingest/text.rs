@@ -12,13 +12,16 @@ pub fn decode(bytes: &[u8]) -> String {
     }
 }
 
-/// Bytes that decide whether a file is text.
-const LOOK_AT: usize = 8192;
+/// The bytes that decide what a file is.
+pub fn head(bytes: &[u8]) -> &[u8] {
+    const LOOK_AT: usize = 8192;
+    &bytes[..bytes.len().min(LOOK_AT)]
+}
 
 /// Is this no text? Control characters tell; a lone one among a thousand bytes, such as the end of a string that a program wrote with it,
 /// does not.
 pub fn is_binary(bytes: &[u8]) -> bool {
-    let head = &bytes[..bytes.len().min(LOOK_AT)];
+    let head = head(bytes);
     let odd = head.iter().filter(|b| **b < 9 || (14..32).contains(*b)).count();
     odd > head.len() / 1000
 }

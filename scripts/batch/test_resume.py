@@ -35,6 +35,10 @@ from power_cut import kill, kill_all_of, need, processes  # noqa: E402
 # What runs at the same time.
 JOBS = 2
 
+# Where every other second a worker is killed, a shard of a slow machine loses more of them than a recipe begins again for. That an
+# engine gives up is not what is tested here.
+RETRIES = 100
+
 
 def digest(folder):
     """Names and contents of all files below a folder."""
@@ -90,7 +94,8 @@ class Engine:
         self.name, self.lobestone, self.folder = name, lobestone, folder
         self.again, shards, steps = False, wanted.shards, wanted.steps
         python = sys.executable
-        recipe = [str(manifest), str(out), "--shards", str(shards), "--do", steps, "--workers", str(JOBS), "--lobestone", lobestone]
+        recipe = [str(manifest), str(out), "--shards", str(shards), "--do", steps, "--workers", str(JOBS)]
+        recipe += ["--retries", str(RETRIES), "--lobestone", lobestone]
         tasks = f"SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX={shards} SLURM_ARRAY_TASK_COUNT={shards} SLURM_CPUS_PER_TASK=1"
         task = [str(HERE / "array.sbatch"), str(manifest), str(out), "--do", steps]
         # A task that fails is no reason to leave the others; all are handed in again.
@@ -100,9 +105,8 @@ class Engine:
         slurm = f"export LOBESTONE={shlex.quote(lobestone)}; until {shlex.join(batch)}; do :; done"
         fleet = shlex.join([lobestone, "fleet", str(out)])
         config = [f"manifest={manifest}", f"out={out}", f"shards={shards}", f"do={steps}", f"lobestone={lobestone}"]
-        snakemake = [
-            wanted.snakemake, "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder), "--retries", "5", "--config", *config,
-        ]
+        snakemake = [wanted.snakemake, "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder)]
+        snakemake += ["--retries", str(RETRIES), "--config", *config]
         # Without a data base of accounts there is no sacct.
         on_slurm = ["--profile", str(HERE / "slurm-profile"), "--slurm-status-command", "squeue", "--slurm-no-account"]
         self.command = {

@@ -167,13 +167,14 @@ def diagnosed(program, folder):
     return found, best
 
 
-def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def main(about, kinds, write, seed, table_file):
+    """Campaigns that `write(folder, kind, size, seed)` makes, kind by kind, diagnosed and judged."""
+    arguments = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--seed", type=int, default=5000)
-    arguments.add_argument("--kinds", default=",".join(KINDS))
+    arguments.add_argument("--seed", type=int, default=seed)
+    arguments.add_argument("--kinds", default=",".join(kinds))
     arguments.add_argument("--keep", type=pathlib.Path)
-    arguments.add_argument("--table", type=pathlib.Path, default=ROOT / "reports/other_physics.csv")
+    arguments.add_argument("--table", type=pathlib.Path, default=ROOT / table_file)
     asked = arguments.parse_args()
     done = []
     if asked.table.exists():
@@ -184,7 +185,7 @@ def main():
         table = csv.DictWriter(file, FIELDS)
         if not done:
             table.writeheader()
-        for number, (kind, (_, *sizes)) in enumerate(KINDS.items()):
+        for number, (kind, (_, *sizes)) in enumerate(kinds.items()):
             for strength, size in zip(("faint", "strong"), sizes):
                 if kind not in asked.kinds.split(",") or (kind, strength) in known:
                     continue
@@ -207,4 +208,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, KINDS, write, 5000, "reports/other_physics.csv")

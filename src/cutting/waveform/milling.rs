@@ -227,69 +227,72 @@ impl MillingCut {
             unit: Self::nothing(orders),
             slopes: wanted.map(|w| (w && derivatives).then(|| Box::new(Self::nothing(orders)))),
         };
-        // Teeth that are alike leave multiples of their number; teeth that are not leave every order, and those with the
-        // same remainder see the same sum over the teeth. Where they are not evenly spaced each order sees its own.
+        // Teeth that are alike leave multiples of their number.
         let differ = law.runout.is_some() || !self.places.is_empty();
-        let stride = if self.is_evenly_spaced() {
-            self.teeth
-        } else {
-            orders + 1
-        };
-        let remainders = if differ { stride } else { 1 };
+        let step = if differ { 1 } else { self.teeth };
+        let rows = orders / step + 1;
         let parts = if derivatives { Chip::PARTS } else { Chip::VALUES };
-        let weights = self.depth_weights(&depth_nodes, orders, remainders);
-        let directions: Vec<[f64; 3]> = nodes
-            .iter()
-            .map(|(phi, width)| {
-                let (sin, cos) = phi.sin_cos();
-                [cos, sin, 1.0].map(|d| d * width / TAU)
-            })
-            .collect();
-        let waves: Vec<Vec<Complex64>> = (0..remainders.min(orders + 1))
-            .map(|r| waves(&nodes, r, stride, orders))
-            .collect();
-        let mut folded = vec![Complex64::ZERO; nodes.len() * 3 * parts];
-        let mut products = Vec::new();
+        let weights = self.depth_weights(&depth_nodes, orders, step);
+        let directions: Vec<Direction> = nodes.iter().map(|node| Direction::new(*node)).collect();
+        let waves = waves(&directions, step, rows);
+        let (mut columns, mut products) = (Vec::new(), Vec::new());
         for (q, &z) in depth_nodes.iter().enumerate() {
-            let sums = self.tooth_sums(&nodes, z, law, derivatives, (parts, remainders.min(orders + 1)));
-            for (r, (wave, sum)) in waves.iter().zip(&sums).enumerate() {
-                // ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ / 2π for all orders and parts at once.
-                for (k, direction) in directions.iter().enumerate() {
-                    for part in 0..parts {
-                        for (d, w) in direction.iter().enumerate() {
-                            folded[k + nodes.len() * (3 * part + d)] = sum[k * parts + part] * *w;
-                        }
+            let edges = self.edges(z, law);
+            let before: Vec<Vec<Before>> = (0..edges.len()).map(|j| self.before(&edges, j, law)).collect();
+            columns.clear();
+            for at in &directions {
+                for before in &before {
+                    let chip = self.chip(at, law, before, derivatives);
+                    for part in &chip.part[..parts] {
+                        columns.extend(at.share.map(|share| share * part));
                     }
                 }
-                let rows = wave.len() / nodes.len();
-                products.resize(rows * 3 * parts, Complex64::ZERO);
-                matmul(
-                    MatMut::from_column_major_slice_mut(&mut products, rows, 3 * parts),
-                    Accum::Replace,
-                    MatRef::from_column_major_slice(wave, rows, nodes.len()),
-                    MatRef::from_column_major_slice(&folded, nodes.len(), 3 * parts),
-                    Complex64::ONE,
-                    Par::Seq,
-                );
-                for row in 0..rows {
-                    let n = r + stride * row;
-                    let at = |part: usize| {
-                        let at = |d: usize| products[row + rows * (3 * part + d)];
-                        [at(0), at(1), at(2)]
-                    };
-                    let integrals =
-                        std::array::from_fn(|p| if p < parts { at(p) } else { Default::default() });
-                    add_order(&mut sampled, &integrals, n, weights[n][q]);
+            }
+            // ∫ part · {cos φ, sin φ, 1} e^{−inφ} dφ / 2π of each tooth for all orders and parts at once.
+            let count = 3 * parts * edges.len();
+            products.resize(2 * rows * count, 0.0);
+            matmul(
+                MatMut::from_row_major_slice_mut(&mut products, 2 * rows, count),
+                Accum::Replace,
+                MatRef::from_column_major_slice(&waves, 2 * rows, nodes.len()),
+                MatRef::from_row_major_slice(&columns, nodes.len(), count),
+                1.0,
+                Par::Seq,
+            );
+            // Ahead of tooth 0 by a, a tooth adds order n turned by na.
+            let alike = if differ { 1.0 } else { self.teeth as f64 };
+            let ahead = |edge: &Edge| TAU / self.teeth as f64 * edge.ahead_teeth;
+            let turns: Vec<Complex64> = edges
+                .iter()
+                .map(|e| Complex64::from_polar(1.0, step as f64 * ahead(e)))
+                .collect();
+            let mut turned = vec![Complex64::from(alike); edges.len()];
+            for (row, (re, im)) in products
+                .chunks(2 * count)
+                .map(|both| both.split_at(count))
+                .enumerate()
+            {
+                let mut integrals = [[Complex64::ZERO; 3]; Chip::PARTS];
+                let teeth = re.chunks(3 * parts).zip(im.chunks(3 * parts));
+                for ((re, im), turned) in teeth.zip(&turned) {
+                    let own = re.iter().zip(im).map(|(re, im)| Complex64::new(*re, *im));
+                    for (sum, own) in integrals.as_flattened_mut().iter_mut().zip(own) {
+                        *sum += turned * own;
+                    }
                 }
+                add_order(&mut sampled, &integrals, step * row, weights[step * row][q]);
+                turned
+                    .iter_mut()
+                    .zip(&turns)
+                    .for_each(|(turned, turn)| *turned *= turn);
             }
         }
         sampled
     }
 
-    /// a ∫ L_q(z) e^{−inψz} dz with L_q the Lagrange polynomial of node q (Filon's rule): `[order][q]`. With one remainder
-    /// only multiples of the number of teeth are worked out.
-    fn depth_weights(&self, depth_nodes: &[f64], orders: usize, remainders: usize) -> Vec<Vec<Complex64>> {
-        let step = if remainders == 1 { self.teeth } else { 1 };
+    /// a ∫ L_q(z) e^{−inψz} dz with L_q the Lagrange polynomial of node q (Filon's rule): `[order][q]`. Only multiples of
+    /// `step` are worked out.
+    fn depth_weights(&self, depth_nodes: &[f64], orders: usize, step: usize) -> Vec<Vec<Complex64>> {
         let mut weights = vec![Vec::new(); orders + 1];
         if depth_nodes.len() == 1 {
             for n in (0..=orders).step_by(step) {
@@ -360,83 +363,44 @@ impl MillingCut {
         }
     }
 
-    /// Σ_j e^{i r a_j} part_j for r below `remainders` at depth `z`, tooth j being ahead of tooth 0 by a_j there (2πj/N where
-    /// they are evenly spaced): `[r][node · parts + part]`.
-    fn tooth_sums(
-        &self,
-        nodes: &[(f64, f64)],
-        z: f64,
-        law: ChipLaw,
-        derivatives: bool,
-        (parts, remainders): (usize, usize),
-    ) -> Vec<Vec<Complex64>> {
-        let edges = self.edges(z, law);
-        let mut sums = vec![vec![Complex64::ZERO; nodes.len() * parts]; remainders];
-        let even = self.is_evenly_spaced();
-        let pitch = TAU / self.teeth as f64;
-        let turn = |r: usize, j: usize| {
-            let teeth = match even {
-                true => ((r * j) % self.teeth) as f64,
-                false => r as f64 * edges[j].ahead_teeth,
-            };
-            Complex64::from_polar(1.0, pitch * teeth)
-        };
-        let alike = if edges.len() == 1 { self.teeth as f64 } else { 1.0 };
-        let turns: Vec<Vec<Complex64>> = (0..edges.len())
-            .map(|j| (0..remainders).map(|r| turn(r, j) * alike).collect())
-            .collect();
-        for (k, &(phi, width)) in nodes.iter().enumerate() {
-            let direction = phi.sin_cos();
-            for j in 0..edges.len() {
-                let chip = self.chip(direction, width, law, (&edges, j), derivatives);
-                for (turn, sum) in turns[j].iter().zip(&mut sums) {
-                    for (sum, part) in sum[k * parts..(k + 1) * parts].iter_mut().zip(&chip.part) {
-                        *sum += turn * part;
-                    }
-                }
-            }
+    /// What the earlier teeth, the tooth itself a revolution ago among them, left for tooth `j` of `edges`; empty where feed
+    /// alone tells.
+    fn before(&self, edges: &[Edge], j: usize, law: ChipLaw) -> Vec<Before> {
+        if law.runout.is_none() && self.places.is_empty() {
+            return Vec::new();
         }
-        sums
+        let offset = law.runout.map_or(0.0, |r| r[0]);
+        let here = edges[j];
+        (1..=edges.len())
+            .map(|m| {
+                let before = edges[(j + m) % edges.len()];
+                // In even pitches: a whole turn more where the count begins again.
+                let turns = ((j + m) / edges.len() * edges.len()) as f64;
+                Before {
+                    feed_mm: (turns + before.ahead_teeth - here.ahead_teeth) * self.feed_per_tooth_mm,
+                    gap_mm: offset * (here.cos - before.cos) + (here.radius_mm - before.radius_mm),
+                    by: [here.cos - before.cos, -offset * (here.sin - before.sin)],
+                    is_as_far: law.runout.is_none() && here.radius_mm == before.radius_mm,
+                }
+            })
+            .collect()
     }
 
-    /// What tooth `j` of `edges` cuts at an immersion angle of the given sine and cosine. `width`: of the quadrature cell,
-    /// rad.
-    fn chip(
-        &self,
-        (sin, cos): (f64, f64),
-        width: f64,
-        law: ChipLaw,
-        (edges, j): (&[Edge], usize),
-        derivatives: bool,
-    ) -> Chip {
-        let c = self.feed_per_tooth_mm;
-        let offset = match law.runout {
-            Some([offset, _]) => offset,
-            None if self.places.is_empty() => {
-                return Chip::new(c * sin, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
-            }
-            None => 0.0,
+    /// What a tooth cuts that has those `before` it.
+    fn chip(&self, at: &Direction, law: ChipLaw, before: &[Before], derivatives: bool) -> Chip {
+        let left = |b: &Before| b.feed_mm * at.sin + b.gap_mm;
+        // What is left to cut is the least that any of them left.
+        let Some(least) = before.iter().reduce(|a, b| if left(b) < left(a) { b } else { a }) else {
+            let h = self.feed_per_tooth_mm * at.sin;
+            return Chip::new(h, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
         };
-        // What is left to cut is the least that any earlier tooth left, the tooth itself a revolution ago among them.
-        let here = edges[j];
-        // How far ahead that tooth is, in even pitches: a whole turn more where the count begins again.
-        let ahead = |m: usize| {
-            let turns = ((j + m) / edges.len() * edges.len()) as f64;
-            turns + edges[(j + m) % edges.len()].ahead_teeth - here.ahead_teeth
-        };
-        let left = |m: usize| {
-            let before = edges[(j + m) % edges.len()];
-            ahead(m) * c * sin + offset * (here.cos - before.cos) + (here.radius_mm - before.radius_mm)
-        };
-        let least = (2..=edges.len()).fold(1, |least, m| if left(m) < left(least) { m } else { least });
-        let (h, before) = (left(least), edges[(j + least) % edges.len()]);
-        let by = [here.cos - before.cos, -offset * (here.sin - before.sin)];
-        if law.runout.is_none() && here.radius_mm == before.radius_mm {
+        let h = left(least);
+        if least.is_as_far {
             // Feed alone: it cuts all the way.
             return Chip::new(h, 1.0, 0.0, [0.0; 2], law.exponent, derivatives);
         }
         // The tooth leaves the cut within a quadrature cell: the share of it that is engaged.
-        let rise = (ahead(least) * c * cos).abs() * width;
+        let rise = (least.feed_mm * at.cos).abs() * at.width;
         let inside = if rise > 0.0 {
             0.5 + h / rise
         } else {
@@ -451,21 +415,55 @@ impl MillingCut {
             h,
             inside.clamp(0.0, 1.0),
             edge_slope,
-            by,
+            least.by,
             law.exponent,
             derivatives,
         )
     }
 }
 
-/// e^{−inφ} for n = `remainder`, `remainder` + `stride`, … up to `orders` at each node, column by column.
-fn waves(nodes: &[(f64, f64)], remainder: usize, stride: usize, orders: usize) -> Vec<Complex64> {
-    let mut waves = Vec::new();
-    for (phi, _) in nodes {
-        let turn = Complex64::from_polar(1.0, -(stride as f64) * phi);
-        let mut wave = Complex64::from_polar(1.0, -(remainder as f64) * phi);
-        for _ in (remainder..=orders).step_by(stride) {
-            waves.push(wave);
+/// A node of the quadrature over the immersion.
+#[derive(Debug, Clone, Copy)]
+struct Direction {
+    sin: f64,
+    cos: f64,
+    /// Of its cell, rad.
+    width: f64,
+    /// cos φ, sin φ and 1, times the width over a turn.
+    share: [f64; 3],
+}
+
+impl Direction {
+    fn new((phi, width): (f64, f64)) -> Direction {
+        let (sin, cos) = phi.sin_cos();
+        Direction {
+            sin,
+            cos,
+            width,
+            share: [cos, sin, 1.0].map(|d| d * width / TAU),
+        }
+    }
+}
+
+/// A tooth that went through before: it left `feed_mm` sin φ + `gap_mm` to cut.
+#[derive(Debug, Clone, Copy)]
+struct Before {
+    feed_mm: f64,
+    gap_mm: f64,
+    /// Derivatives of what it left by the offset of the axis and by its direction.
+    by: [f64; 2],
+    /// No nearer to the axis and no farther than the tooth itself.
+    is_as_far: bool,
+}
+
+/// Real and imaginary part of e^{−inφ} for the first `rows` multiples n of `step`, one after the other, node by node.
+fn waves(directions: &[Direction], step: usize, rows: usize) -> Vec<f64> {
+    let mut waves = Vec::with_capacity(2 * rows * directions.len());
+    for at in directions {
+        let turn = Complex64::new(at.cos, -at.sin).powu(step as u32);
+        let mut wave = Complex64::ONE;
+        for _ in 0..rows {
+            waves.extend([wave.re, wave.im]);
             wave *= turn;
         }
     }
@@ -473,7 +471,7 @@ fn waves(nodes: &[(f64, f64)], remainder: usize, stride: usize, orders: usize) -
 }
 
 /// (1/2π) ∫ e^{−imφ} dφ over an immersion.
-pub(super) fn window(immersion: Immersion, m: i64) -> Complex64 {
+fn window(immersion: Immersion, m: i64) -> Complex64 {
     let Immersion { start_rad, exit_rad } = immersion;
     if m == 0 {
         return Complex64::from((exit_rad - start_rad) / TAU);

@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::milling::{MillingCut, UnitForces, window};
+use super::milling::{MillingCut, UnitForces};
 use super::tooth_place::ToothPlace;
 use crate::data::Immersion;
 
@@ -71,13 +71,16 @@ impl MillingCut {
             by_angle: (0..slopes).map(|_| Self::nothing(orders)).collect(),
         };
         let feed_per_rad = self.feed_per_tooth_mm * teeth as f64 / TAU;
+        let helix: Vec<Complex64> = (0..=orders).map(|n| self.helix_at(n as i64)).collect();
         for (j, place) in places.iter().enumerate() {
+            let ahead = Turns::new(-place.ahead_rad, orders);
             for stretch in self.stretches(&places, j) {
                 let before = (j + stretch.passes) % teeth;
+                let Immersion { start_rad, exit_rad } = stretch.immersion;
+                let ends = [start_rad, exit_rad].map(|at| Turns::new(at, orders + 2));
                 for n in 0..=orders {
-                    let turn =
-                        self.helix_at(n as i64) * Complex64::from_polar(1.0, n as f64 * place.ahead_rad);
-                    let integral = Integrals::over(stretch.immersion, n);
+                    let turn = helix[n] * ahead.at(n as i64);
+                    let integral = Integrals::over(stretch.immersion, &ends, n);
                     let cutting: [Complex64; 3] = std::array::from_fn(|d| {
                         turn * (integral.by_sine[d] * stretch.slope_mm
                             + integral.plain[d] * stretch.offset_mm)
@@ -89,11 +92,14 @@ impl MillingCut {
                     }
                     // Where the chip begins or ends from nothing the stretch grows with the chip: only the edge notices.
                     let mut grows = [[Complex64::ZERO; 3]; 2];
-                    let Immersion { start_rad, exit_rad } = stretch.immersion;
-                    for (at, is_free) in [start_rad, exit_rad].into_iter().zip(stretch.from_nothing) {
+                    let free = [start_rad, exit_rad]
+                        .into_iter()
+                        .zip(&ends)
+                        .zip(stretch.from_nothing);
+                    for ((at, end), is_free) in free {
                         let rise = (stretch.slope_mm * at.cos()).abs();
                         if is_free && rise > NOTHING * self.feed_per_tooth_mm {
-                            let value = turn * Complex64::from_polar(1.0 / (TAU * rise), -(n as f64) * at);
+                            let value = turn * end.at(n as i64) / (TAU * rise);
                             for (d, factor) in [at.cos(), at.sin(), 1.0].into_iter().enumerate() {
                                 grows[0][d] += value * factor;
                                 grows[1][d] += value * (factor * at.sin());
@@ -200,10 +206,31 @@ struct Integrals {
     by_sine: [Complex64; 3],
 }
 
+/// e^{−inφ} of one angle, for all orders.
+struct Turns(Vec<Complex64>);
+
+impl Turns {
+    fn new(angle_rad: f64, orders: usize) -> Turns {
+        let one = Complex64::from_polar(1.0, -angle_rad);
+        let powers = std::iter::successors(Some(Complex64::ONE), |at| Some(at * one));
+        Turns(powers.take(orders + 1).collect())
+    }
+
+    /// `order` may be negative.
+    fn at(&self, order: i64) -> Complex64 {
+        let turn = self.0[order.unsigned_abs() as usize];
+        if order < 0 { turn.conj() } else { turn }
+    }
+}
+
 impl Integrals {
-    fn over(immersion: Immersion, n: usize) -> Integrals {
+    /// `ends`: the turns of the angles that the stretch begins and ends at.
+    fn over(Immersion { start_rad, exit_rad }: Immersion, ends: &[Turns; 2], n: usize) -> Integrals {
         let i = Complex64::I;
-        let w = [-2i64, -1, 0, 1, 2].map(|m| window(immersion, n as i64 + m));
+        let w = [-2i64, -1, 0, 1, 2].map(|m| match n as i64 + m {
+            0 => Complex64::from((exit_rad - start_rad) / TAU),
+            order => (ends[1].at(order) - ends[0].at(order)) * (i / (TAU * order as f64)),
+        });
         let cos = 0.5 * (w[1] + w[3]);
         let sin = (w[1] - w[3]) / (2.0 * i);
         let sin_cos = (w[0] - w[4]) / (4.0 * i);

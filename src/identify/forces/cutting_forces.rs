@@ -2,7 +2,9 @@
 
 use num_complex::Complex64;
 
-use crate::cutting::waveform::{ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, UnitForces};
+use crate::cutting::waveform::{
+    ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, ToothPlace, UnitForces,
+};
 use crate::cutting::{EdgeBit, ForceAxis};
 use crate::effects::cutting::{CutPhysics, Mixing, OwnTeeth};
 use crate::identify::forces::asynchronous_lines::MOST_SHIFT;
@@ -236,13 +238,26 @@ fn chip_forces(
             }
         }
     }
-    // Together with another law of the chip there is no closed form: differences.
+    // Together with another law of the chip there is no closed form: differences, mm or rad.
+    const STEP: f64 = 1e-7;
+    let unmoved = own.map(|_| milling.sampled(cut.orders, chip_law(physics), false).unit);
+    let tooth_slope = |change: &dyn Fn(&mut ToothPlace), index: usize| {
+        let mut moved = milling.clone();
+        change(&mut moved.places[index]);
+        let mut slope = moved.sampled(cut.orders, chip_law(physics), false).unit;
+        let values = slope.iter_mut().flatten().flatten();
+        let from = unmoved.iter().flatten().flatten().flatten();
+        values
+            .zip(from)
+            .for_each(|(value, from)| *value = (*value - from) / STEP);
+        slope
+    };
     for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
-        let slope = tooth_slope(physics, cut, milling, |m, step| m.places[index].radius_mm += step);
+        let slope = tooth_slope(&|place| place.radius_mm += STEP, index);
         add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
     }
     for (index, by) in own.into_iter().flat_map(OwnTeeth::angles) {
-        let slope = tooth_slope(physics, cut, milling, |m, step| m.places[index].ahead_rad += step);
+        let slope = tooth_slope(&|place| place.ahead_rad += STEP, index);
         add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
     }
     forces
@@ -256,31 +271,6 @@ fn chip_law(physics: &CutPhysics) -> ChipLaw {
             .as_ref()
             .map(|r| [r.offset_mm.value, r.angle_rad.value]),
     }
-}
-
-/// Derivative of the unit forces by what `change` moves, by central differences (mm or rad).
-fn tooth_slope(
-    physics: &CutPhysics,
-    cut: &CutData,
-    milling: &MillingCut,
-    change: impl Fn(&mut MillingCut, f64),
-) -> UnitForces {
-    const STEP: f64 = 1e-5;
-    let moved = |step: f64| {
-        let mut other = milling.clone();
-        change(&mut other, step);
-        other.sampled(cut.orders, chip_law(physics), false).unit
-    };
-    let (mut slope, low) = (moved(STEP), moved(-STEP));
-    let pairs = slope
-        .iter_mut()
-        .flatten()
-        .flatten()
-        .zip(low.iter().flatten().flatten());
-    for (high, low) in pairs {
-        *high = (*high - low) / (2.0 * STEP);
-    }
-    slope
 }
 
 /// Smallest and largest share of the stated depth that a tool pushed off (or drawn in) cuts.

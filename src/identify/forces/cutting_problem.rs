@@ -7,6 +7,7 @@ use std::f64::consts::{SQRT_2, TAU};
 use nalgebra::DVector;
 use num_complex::Complex64;
 use rayon::prelude::*;
+use realfft::RealFftPlanner;
 
 use crate::effects::cutting::CutPhysics;
 use crate::identify::forces::baseline_drift::{BaselineDrift, dot};
@@ -349,21 +350,17 @@ fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
             *p += model.conj() * recorded / channel.order_std[n - 1].powi(2);
         }
     }
-    // In units of the step's period.
-    let agreement = |x: f64| {
-        let z = Complex64::from_polar(1.0, x);
-        product.iter().rev().fold(Complex64::ZERO, |s, p| (s + p) * z).re
-    };
+    // In units of the step's period; the whole grid by one transform.
     let grid = 6 * most.max(8);
     let spacing = TAU / grid as f64;
-    let mut best = (f64::NEG_INFINITY, 0.0);
-    for k in 0..grid {
-        let value = agreement(k as f64 * spacing);
-        if value > best.0 {
-            best = (value, k as f64 * spacing);
-        }
-    }
-    let mut x = best.1;
+    let transform = RealFftPlanner::<f64>::new().plan_fft_inverse(grid);
+    let (mut spectrum, mut agreement) = (transform.make_input_vec(), transform.make_output_vec());
+    spectrum[1..=most].copy_from_slice(&product);
+    let best = match transform.process(&mut spectrum, &mut agreement) {
+        Ok(()) => argmax(&agreement),
+        Err(_) => 0,
+    };
+    let mut x = best as f64 * spacing;
     for _ in 0..20 {
         let (mut first, mut second) = (0.0, 0.0);
         for (k, p) in product.iter().enumerate() {
@@ -384,6 +381,12 @@ fn best_phase(cut: &CutData, forces: &Forces, step: usize) -> f64 {
         }
     }
     x / step as f64
+}
+
+/// Where the largest value stands, the first of several.
+fn argmax(values: &[f64]) -> usize {
+    let larger = |best: usize, i: usize| if values[i] > values[best] { i } else { best };
+    (1..values.len()).fold(0, larger)
 }
 
 /// First contact at which model and record agree best, within `range` (s).

@@ -373,7 +373,8 @@ fn of_coefficient(groups: &[&ForceGroup], j: usize, warnings: &mut Vec<String>) 
     };
     if !negative.is_empty() {
         let remedy = if c.edge {
-            "no edge pulls; look at drift and at effects the model lacks, or hold it at zero with --nonnegative-edges"
+            "no edge pulls; check tool_from_dyno, the immersion angles and the drift, then look at effects the model lacks. Where all that is \
+             right, --nonnegative-edges holds it at zero"
         } else if groups.iter().any(|g| g.process == Process::Turning) {
             "check tool_from_dyno, the nose radius and the cutting edge angle"
         } else {

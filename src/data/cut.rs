@@ -51,6 +51,14 @@ impl Immersion {
         start_rad: 0.0,
         exit_rad: std::f64::consts::PI,
     };
+
+    /// The same part of the cutter on the other side of the feed: down milling for up milling.
+    pub fn mirrored(self) -> Immersion {
+        Immersion {
+            start_rad: std::f64::consts::PI - self.exit_rad,
+            exit_rad: std::f64::consts::PI - self.start_rad,
+        }
+    }
 }
 
 /// What was cut: geometry and feed of one record.

@@ -26,8 +26,8 @@ const LEVEL_OVER_CHANGE: f64 = 3.0;
 /// Turns looked at, at most: those nearest to where air and cut meet.
 const MOST_TURNS: usize = 60;
 
-/// What comes back one turn later (covariance of neighbouring turns, each less its mean), and all fluctuation within turns;
-/// both summed over the channels. `None` with less than two turns.
+/// What comes back one turn later (covariance of neighbouring turns, each less its mean and the drift of all), and all
+/// fluctuation within turns; both summed over the channels. `None` with less than two turns.
 pub(super) fn content<S: Sample>(channels: &[&[S]], range: &Range<usize>, turn: f64) -> Option<(f64, f64)> {
     let turns = (range.len() as f64 / turn + 1e-6).floor() as usize;
     let length = turn.floor() as usize;
@@ -36,13 +36,15 @@ pub(super) fn content<S: Sample>(channels: &[&[S]], range: &Range<usize>, turn: 
     }
     let (mut repeated, mut all) = (0.0, 0.0);
     for samples in channels {
+        // A ramp comes back in every turn as well.
+        let drift = level(samples, range, turn).1 / (turns as f64 * turn);
         let of_turn = |k: usize| -> Vec<f64> {
             let from = range.start as f64 + k as f64 * turn;
             let value = |i: usize| {
                 let at = from + i as f64;
                 let (low, share) = (at.floor() as usize, at - at.floor());
                 let at = |i: usize| samples[i.min(samples.len() - 1)].value();
-                at(low) * (1.0 - share) + at(low + 1) * share
+                at(low) * (1.0 - share) + at(low + 1) * share - drift * i as f64
             };
             let values: Vec<f64> = (0..length).map(value).collect();
             let m = mean(&values);

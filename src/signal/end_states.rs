@@ -11,6 +11,9 @@ pub(super) const MIN_STATE_BLOCKS: usize = 4;
 const DEPARTURE_SIGMA: f64 = 6.0;
 /// …and by this part of the channel's range (slow bends of the drift stay below it).
 const DEPARTURE_OF_RANGE: f64 = 0.02;
+/// A change of a block's fluctuation must be this many times what it varies by from one block to the next: noise with a
+/// resonance or of a narrow band varies more than white noise does.
+const LOUDNESS_SIGMA: f64 = 4.0;
 /// Two states differ in kind when their distance is beyond this part of the largest distance.
 const SAME_STATE: f64 = 0.35;
 
@@ -34,16 +37,35 @@ struct Limits<'a> {
     fluctuation: f64,
 }
 
+/// Logarithm of the ratio of two fluctuations.
+fn loudness_step(from: f64, to: f64) -> f64 {
+    (to.max(f64::MIN_POSITIVE) / from.max(f64::MIN_POSITIVE)).ln()
+}
+
 impl<'a> Limits<'a> {
     fn new(blocks: &'a SignalBlocks) -> Self {
-        // From neighbours; the lower quartile, since inside the cut they differ more.
-        let steps: Vec<f64> = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        // From neighbours; the lower quartile, since inside the cut they differ more. Near and far ones, too, against the line
+        // between them: what hum makes of the means comes back after a few blocks.
+        let steps = blocks.mean.windows(2).map(|w| (w[1] - w[0]).abs());
+        let step = quantile(steps, 0.25).unwrap_or(0.0) / (0.3186 * std::f64::consts::SQRT_2);
+        let bend = |apart: usize| {
+            let m = &blocks.mean;
+            let bends = (2 * apart..m.len()).map(|i| (m[i] - 2.0 * m[i - apart] + m[i - 2 * apart]).abs());
+            quantile(bends, 0.25).unwrap_or(0.0) / (0.3186 * 6f64.sqrt())
+        };
+        let steps: Vec<f64> = blocks
+            .std_dev
+            .windows(2)
+            .map(|w| loudness_step(w[0], w[1]).abs())
+            .collect();
+        let varies = median(&steps) / (0.6745 * std::f64::consts::SQRT_2);
+        let by_chance = DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt();
         Limits {
             blocks,
-            sigma: quantile(steps.iter().copied(), 0.25).unwrap_or(0.0) / (0.3186 * std::f64::consts::SQRT_2),
+            sigma: step.max(bend(1)).max(bend(2)),
             range: quantile(blocks.mean.iter().copied(), 0.95).unwrap_or(0.0)
                 - quantile(blocks.mean.iter().copied(), 0.05).unwrap_or(0.0),
-            fluctuation: 0.25f64.max(DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt()),
+            fluctuation: 0.25f64.max(by_chance).max(LOUDNESS_SIGMA * varies),
         }
     }
 
@@ -71,7 +93,9 @@ impl<'a> Limits<'a> {
     fn changes_loudness(&self, at: &impl Fn(usize) -> usize, trail: &[usize], k: usize) -> bool {
         let std: Vec<f64> = trail.iter().map(|&i| self.blocks.std_dev[at(i)]).collect();
         let (usual, now) = (median(&std), self.blocks.std_dev[at(k)]);
-        usual > 0.0 && (now / usual).ln().abs() > self.fluctuation
+        let squares: f64 = std.windows(2).map(|w| loudness_step(w[0], w[1]).powi(2)).sum();
+        let varies = (0.5 * squares / (std.len().max(2) - 1) as f64).sqrt();
+        usual > 0.0 && loudness_step(usual, now).abs() > self.fluctuation.max(LOUDNESS_SIGMA * varies)
     }
 }
 

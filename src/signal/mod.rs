@@ -16,8 +16,8 @@ mod spindle_track;
 mod steady_window;
 mod tooth_line;
 
-pub(crate) use blocks::line;
 pub use blocks::{SignalBlocks, mean, median};
+pub(crate) use blocks::{line, robust_std};
 pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
 pub(crate) use faults::least_and_greatest;

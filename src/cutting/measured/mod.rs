@@ -5,5 +5,6 @@ pub(crate) mod average;
 pub(crate) mod cut_analysis;
 pub(crate) mod faults;
 pub(crate) mod in_step;
+pub(crate) mod leak;
 pub(crate) mod record;
 pub(crate) mod teeth;

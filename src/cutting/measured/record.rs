@@ -13,6 +13,7 @@ use crate::cutting::measured::average::average;
 use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
+use crate::cutting::measured::leak::high_pass;
 use crate::cutting::measured::teeth::{
     CERTAIN, idle_tooth, one_tooth_alone, parts_of_turn, tooth_back_mm, tooth_passing_too_weak,
 };
@@ -179,6 +180,21 @@ pub fn analyse_cut<S: Sample>(
     }
     let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
     air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
+    for ((axis, _, values), channel) in usable.iter().zip(&channels) {
+        let Air {
+            before: Some(before),
+            after: Some(after),
+        } = &phases.air
+        else {
+            continue;
+        };
+        let level = |range: &Range<usize>| values.get(range.clone()).map_or(0.0, signal::mean);
+        let force = level(&steady) - level(before);
+        let at = (samples_per_revolution, rate);
+        if carrying.contains(&channel.axis) {
+            notices.extend(high_pass(axis.label(), values, after, force, at));
+        }
+    }
     unsteady_notice(
         &usable,
         &channels,

@@ -77,6 +77,20 @@ pub struct CutData {
 }
 
 impl CutData {
+    /// Angles between which a tooth is in the work, degrees; `None` where nothing is milled.
+    pub fn immersion_deg(&self) -> Option<[f64; 2]> {
+        let CutKind::Milling { cut, .. } = &self.kind else {
+            return None;
+        };
+        Some([cut.immersion.start_rad, cut.immersion.exit_rad].map(f64::to_degrees))
+    }
+
+    /// Milled with more of the tool on one side of the feed than on the other: up or down milling.
+    pub fn is_one_sided(&self) -> bool {
+        self.immersion_deg()
+            .is_some_and(|[start, exit]| (start + exit - 180.0).abs() > 1.0)
+    }
+
     /// One cut, the `index`-th of all, from its record and what was read off it.
     ///
     /// # Errors
@@ -385,6 +399,20 @@ impl CuttingData {
             .map(|(_, c)| c.clone())
             .collect();
         CuttingData { cuts, ..self.clone() }
+    }
+
+    /// The same records, the milled cuts for which `turned` holds (by index into [`CuttingData::cuts`]) with their immersion seen
+    /// from the other side: up milling for down milling.
+    pub fn milled_the_other_way(&self, turned: impl Fn(usize) -> bool) -> Self {
+        let mut own = self.clone();
+        for (_, cut) in own.cuts.iter_mut().enumerate().filter(|(i, _)| turned(*i)) {
+            let cut = Arc::make_mut(cut);
+            if let CutKind::Milling { cut: milling, unit } = &mut cut.kind {
+                milling.immersion = milling.immersion.mirrored();
+                **unit = milling.linear(cut.orders);
+            }
+        }
+        own
     }
 
     /// Numbers compared.

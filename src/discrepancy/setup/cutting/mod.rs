@@ -4,6 +4,9 @@
 //! coefficients a cut can have do not. Another reading of the channels is another `tool_from_dyno`: it is fitted anew, and
 //! those that leave equally little are told apart by their coefficients.
 
+mod direction;
+mod plausible;
+
 use std::sync::Arc;
 
 use num_complex::Complex64;
@@ -19,7 +22,9 @@ use crate::data::Process;
 use crate::identify::forces::cutting_study::{
     EXPLAINS_NRMS, NOISE_KNOWN_TO, calibrate_cutting, cutting_nrms, small_errors,
 };
-use crate::identify::{Calibration, CuttingData, CuttingModel};
+use crate::identify::{CuttingData, CuttingModel};
+use direction::milling_direction;
+use plausible::{coefficient, fit, improbability};
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
@@ -53,7 +58,10 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     if data.speed_is_contradicted {
         return Ok(check);
     }
-    if let Some((finding, left)) = dyno_axes(data)? {
+    // The waveform is cut from the other side, or seen from one: what leaves less is told.
+    let found = [milling_direction(data)?, dyno_axes(data)?];
+    let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((finding, left)) = least {
         check.explained_share = 1.0;
         check.reduced_chi2 = left;
         check.findings.push(finding);
@@ -106,36 +114,6 @@ struct Trial {
     nrms: f64,
     improbability: f64,
     cutting: [f64; 3],
-}
-
-fn coefficient(calibration: &Calibration, name: &str) -> f64 {
-    let found = calibration.parameters.iter().find(|p| p.name == name);
-    found.map_or(0.0, |p| p.value)
-}
-
-fn fit(data: &CuttingData) -> Option<Calibration> {
-    let model = CuttingModel::new(data, true).ok()?;
-    calibrate_cutting(&model, data).ok()
-}
-
-/// How far coefficients are from those that metal cutting has, as a χ²: radial to tangential 0.4 within a factor of two,
-/// axial to tangential 0.2 ± 0.25, no edge force that pulls the tool along (Altintas 2012, tables of §2).
-fn improbability(calibration: &Calibration) -> f64 {
-    let get = |name: &str| coefficient(calibration, name);
-    let [ktc, krc, kac] = [get("ktc_n_per_mm2"), get("krc_n_per_mm2"), get("kac_n_per_mm2")];
-    if ktc <= 0.0 {
-        return 60.0;
-    }
-    let radial = match krc > 0.02 * ktc {
-        true => ((krc / ktc / 0.4).ln() / 0.7).powi(2),
-        false => 20.0,
-    };
-    // Negative: the workpiece would pull the tool along its axis the wrong way for the sense of the helix.
-    let pulled = if kac < -0.02 * ktc { 6.0 } else { 0.0 };
-    let axial = ((kac / ktc - 0.2) / 0.25).powi(2) + pulled;
-    let edges =
-        ["kte_n_per_mm", "kre_n_per_mm"].map(|name| (get(name).min(0.0) / (0.01 * ktc)).powi(2).min(10.0));
-    radial + axial.min(20.0) + edges[0] + edges[1]
 }
 
 fn read(data: &CuttingData, turn: Turn) -> CuttingData {

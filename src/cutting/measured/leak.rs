@@ -1,0 +1,89 @@
+//! Forces through a high-pass: a charge amplifier at a short time constant, or an input that is AC-coupled. What a cut lost of its
+//! mean force stands on the other side of zero when the cut ends, and dies away.
+
+use std::ops::Range;
+
+use crate::cutting::measured::cut_analysis::Notice;
+use crate::data::Sample;
+use crate::signal::{SignalBlocks, robust_std};
+
+pub(crate) const HIGH_PASS: &str = "a high-pass takes the mean force away: where the cut ends the zero stands on the other side and comes back; \
+     set the amplifier to its long time constant and the input to DC, and cut again (averages and coefficients of this \
+     record are too small)";
+
+/// Part of the mean force that stands on the other side of zero from which on it is told.
+const LOST: f64 = 0.1;
+/// Ratio of the changes between thirds of the air above which it is a line, not something that dies away.
+const STRAIGHT: f64 = 0.8;
+/// Standard deviations of turn means by which the first third must differ from the second.
+const SIGMAS: f64 = 6.0;
+/// Turns of each third, at least.
+const LEAST_TURNS: usize = 4;
+
+/// Of one channel: `force` as recorded in the steady window, against the zero before the cut; samples a turn and a second.
+pub(crate) fn high_pass<S: Sample>(
+    channel: &str,
+    values: &[S],
+    after: &Range<usize>,
+    force: f64,
+    (turn, rate): (f64, f64),
+) -> Option<Notice> {
+    let own = values.get(after.clone())?;
+    let turns = SignalBlocks::of(own.len(), |i| own[i].value(), turn).mean;
+    let third = turns.len() / 3;
+    if third < LEAST_TURNS {
+        return None;
+    }
+    let mean = |k: usize| turns[k * third..(k + 1) * third].iter().sum::<f64>() / third as f64;
+    let (first, second) = (mean(0) - mean(1), mean(1) - mean(2));
+    let ratio = second / first;
+    let scatter = robust_std(&turns[2 * third..]);
+    if !(ratio > 0.0 && ratio < STRAIGHT) || first.abs() < SIGMAS * scatter {
+        return None;
+    }
+    // y e^(−t/τ) averaged over thirds of length a: the differences are y (τ/a) (1 − r)² rᵏ with r = e^(−a/τ).
+    let a_s = third as f64 * turn / rate;
+    let tau_s = -a_s / ratio.ln();
+    let at_the_end = first * a_s / (tau_s * (1.0 - ratio).powi(2));
+    (at_the_end * force < 0.0 && at_the_end.abs() > LOST * force.abs()).then(|| Notice {
+        kind: HIGH_PASS,
+        detail: format!("{channel}: {at_the_end:+.0} after {force:+.0}, time constant {tau_s:.2} s"),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE: f64 = 5000.0;
+    const TURN: f64 = 125.0;
+
+    /// A cut of `force` from 1 s to 2 s, through a high-pass, with noise of a newton; what is told of the air after it.
+    fn told(force: f64, tau_s: f64, drift_per_s: f64) -> Option<Notice> {
+        let mut low = 0.0;
+        let values: Vec<f64> = (0..(3.0 * RATE) as usize)
+            .map(|i| {
+                let t = i as f64 / RATE;
+                let cutting = (1.0..2.0).contains(&t);
+                let now = if cutting { force } else { 0.0 };
+                low += (now - low) / (tau_s * RATE);
+                let noise = ((i * 7919 % 1009) as f64 / 504.5 - 1.0) * 1.7;
+                now - low + drift_per_s * t + noise
+            })
+            .collect();
+        let steady: Vec<f64> = values[5500..9500].to_vec();
+        let force = steady.iter().sum::<f64>() / steady.len() as f64;
+        high_pass("Fx", &values, &(10_300..15_000), force, (TURN, RATE))
+    }
+
+    #[test]
+    fn what_dies_away_after_the_cut_is_told_and_a_drift_is_not() {
+        let notice = told(200.0, 0.3, 0.0).unwrap();
+        assert!(notice.detail.contains("time constant 0.3"), "{}", notice.detail);
+        assert!(told(-80.0, 0.15, 5.0).is_some());
+        assert_eq!(told(200.0, 1e9, 0.0), None);
+        assert_eq!(told(200.0, 1e9, 30.0), None);
+        // A long time constant takes little, and what it took does not come back within a second.
+        assert_eq!(told(200.0, 40.0, 0.0), None);
+    }
+}

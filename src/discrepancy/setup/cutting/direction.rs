@@ -1,0 +1,116 @@
+//! Up milling written down as down milling, in all cuts or in some: the mean forces fit coefficients either way, the waveforms do
+//! not.
+
+use rayon::prelude::*;
+
+use super::plausible::{coefficient, fit, improbability};
+use super::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS};
+use crate::Result;
+use crate::cutting::USUAL;
+use crate::discrepancy::setup::SetupFinding;
+use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, cutting_nrms};
+use crate::identify::{Calibration, CuttingData, CuttingModel};
+
+/// One more cut is taken to be milled the other way where that leaves this part of the misfit.
+const CUT_BY_CUT: f64 = 0.7;
+
+/// Records read with some of their cuts milled the other way.
+struct Mirrored {
+    /// By index into the data's cuts.
+    cuts: Vec<usize>,
+    data: CuttingData,
+    fit: Calibration,
+}
+
+impl Mirrored {
+    fn new(data: &CuttingData, cuts: Vec<usize>) -> Option<Mirrored> {
+        let data = data.milled_the_other_way(|i| cuts.contains(&i));
+        let fit = fit(&data)?;
+        Some(Mirrored { cuts, data, fit })
+    }
+
+    fn is_plausible(&self) -> Option<bool> {
+        let [low, high] = USUAL;
+        let model = CuttingModel::new(&self.data, true).ok()?;
+        let nrms = cutting_nrms(&model, &self.data, &self.fit.theta).ok()?;
+        let ktc = coefficient(&self.fit, "ktc_n_per_mm2");
+        Some(improbability(&self.fit) < IMPLAUSIBLE && (low..high).contains(&ktc) && nrms < EXPLAINS_NRMS)
+    }
+}
+
+/// Cuts that were milled the other way, where the waveforms say so; with the misfit that is left then.
+///
+/// # Errors
+/// None so far; as its neighbours.
+pub(super) fn milling_direction(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
+    let one_sided: Vec<usize> = (0..data.cuts.len())
+        .filter(|i| data.cuts[*i].is_one_sided())
+        .collect();
+    let Some(now) = fit(data) else { return Ok(None) };
+    if one_sided.is_empty() || now.reduced_chi2 < SUSPICIOUS {
+        return Ok(None);
+    }
+    let is_much_better = |m: &Mirrored| m.fit.reduced_chi2 < MUCH_BETTER * now.reduced_chi2;
+    let all = Mirrored::new(data, one_sided.clone()).filter(is_much_better);
+    let found = all.or_else(|| cut_by_cut(data, &one_sided, now.reduced_chi2).filter(is_much_better));
+    let Some(found) = found.filter(|m| m.is_plausible() == Some(true)) else {
+        return Ok(None);
+    };
+    let of_cut = |i: &usize| {
+        let cut = &found.data.cuts[*i];
+        let [start, exit] = cut.immersion_deg().unwrap_or_default();
+        format!("{}: start_deg = {start:.1}, exit_deg = {exit:.1}", cut.id)
+    };
+    let angles: Vec<String> = found.cuts.iter().take(3).map(of_cut).collect();
+    let more = if found.cuts.len() > angles.len() {
+        ", and so on"
+    } else {
+        ""
+    };
+    let ids: Vec<&str> = found.cuts.iter().map(|i| data.cuts[*i].id.as_str()).collect();
+    let which = match found.cuts.len() == data.cuts.len() {
+        true => "all cuts".to_string(),
+        false => format!("cut {}", ids.join(", ")),
+    };
+    let [ktc, krc, kac] =
+        ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"].map(|n| coefficient(&found.fit, n));
+    let left = found.fit.reduced_chi2;
+    let finding = SetupFinding {
+        kind: "milling-direction",
+        place: which,
+        value: None,
+        std_error: None,
+        unit: "",
+        confidence: 0.97,
+        remedy: format!(
+            "Up and down milling look exchanged: write the immersion angles the other way round ({}{more}). Read so, the waveforms \
+             leave {left:.2} times the variance of the noise (as it is {:.2}) and Ktc, Krc, Kac are {ktc:.0}, {krc:.0}, {kac:.0} \
+             N/mm². The coefficients with the present angles are wrong.",
+            angles.join("; "),
+            now.reduced_chi2,
+        ),
+    };
+    Ok(Some((finding, left)))
+}
+
+/// Cut after cut turned round as long as that helps, the best first; at most half of them.
+fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: f64) -> Option<Mirrored> {
+    let mut best: Option<Mirrored> = None;
+    for _ in 0..one_sided.len() / 2 {
+        let so_far = best.as_ref().map_or(&[][..], |m| &m.cuts);
+        let next = one_sided
+            .par_iter()
+            .filter(|i| !so_far.contains(i))
+            .filter_map(|i| Mirrored::new(data, [so_far, &[*i]].concat()))
+            .min_by(|a, b| a.fit.reduced_chi2.total_cmp(&b.fit.reduced_chi2))?;
+        let left = best.as_ref().map_or(now, |m| m.fit.reduced_chi2);
+        if next.fit.reduced_chi2 > CUT_BY_CUT * left {
+            break;
+        }
+        best = Some(next);
+    }
+    if let Some(best) = &mut best {
+        best.cuts.sort_unstable();
+    }
+    best
+}

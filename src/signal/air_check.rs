@@ -133,9 +133,11 @@ pub(super) fn air_in<S: Sample>(
 
 /// Does the level of `air` stand off that of `core` in some channel?
 fn stands_off<S: Sample>(channels: &[&[S]], air: &Range<usize>, core: &Range<usize>, turn: f64) -> bool {
+    // Its entry and exit are no scatter of the cut.
+    let middle = core.start + core.len() / 4..core.end - core.len() / 4;
     channels.iter().any(|samples| {
         let (a, change_a, scatter_a) = level(samples, air, turn);
-        let (c, change_c, scatter_c) = level(samples, core, turn);
+        let (c, change_c, scatter_c) = level(samples, &middle, turn);
         let distance = (a - c).abs();
         distance > LEVEL_SIGMAS * scatter_a.max(scatter_c)
             && distance > LEVEL_OVER_CHANGE * change_a.abs().max(change_c.abs())
@@ -192,6 +194,18 @@ mod tests {
             let ramp = |t: f64| ((t - 12.0) / 12.0).clamp(0.0, 1.0);
             let part = found(&record(3000, seed, 0.6, 6.0, ramp), 16.0).unwrap();
             assert!(part.start == 0 && part.end <= (13.5 * TURN) as usize, "{part:?}");
+        }
+    }
+
+    #[test]
+    fn a_steep_ramp_does_not_make_a_cut_of_air() {
+        for seed in 0..10 {
+            let mut samples = record(3000, seed, 0.6, 6.0, |t| if t < 12.0 { 0.0 } else { 1.0 });
+            samples
+                .iter_mut()
+                .enumerate()
+                .for_each(|(i, v)| *v += 5.0 * i as f64);
+            assert_eq!(found(&samples, 12.0), Some(0..(12.0 * TURN) as usize));
         }
     }
 

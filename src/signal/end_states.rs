@@ -42,6 +42,13 @@ fn loudness_step(from: f64, to: f64) -> f64 {
     (to.max(f64::MIN_POSITIVE) / from.max(f64::MIN_POSITIVE)).ln()
 }
 
+/// Standard deviation of the logarithm of a block's fluctuation, from neighbours.
+fn loudness_varies(blocks: &SignalBlocks) -> f64 {
+    let pairs = blocks.std_dev.windows(2);
+    let steps: Vec<f64> = pairs.map(|w| loudness_step(w[0], w[1]).abs()).collect();
+    median(&steps) / (0.6745 * std::f64::consts::SQRT_2)
+}
+
 impl<'a> Limits<'a> {
     fn new(blocks: &'a SignalBlocks) -> Self {
         // From neighbours; the lower quartile, since inside the cut they differ more. Near and far ones, too, against the line
@@ -53,19 +60,15 @@ impl<'a> Limits<'a> {
             let bends = (2 * apart..m.len()).map(|i| (m[i] - 2.0 * m[i - apart] + m[i - 2 * apart]).abs());
             quantile(bends, 0.25).unwrap_or(0.0) / (0.3186 * 6f64.sqrt())
         };
-        let steps: Vec<f64> = blocks
-            .std_dev
-            .windows(2)
-            .map(|w| loudness_step(w[0], w[1]).abs())
-            .collect();
-        let varies = median(&steps) / (0.6745 * std::f64::consts::SQRT_2);
         let by_chance = DEPARTURE_SIGMA / (2.0 * blocks.samples_per_block).sqrt();
         Limits {
             blocks,
             sigma: step.max(bend(1)).max(bend(2)),
             range: quantile(blocks.mean.iter().copied(), 0.95).unwrap_or(0.0)
                 - quantile(blocks.mean.iter().copied(), 0.05).unwrap_or(0.0),
-            fluctuation: 0.25f64.max(by_chance).max(LOUDNESS_SIGMA * varies),
+            fluctuation: 0.25f64
+                .max(by_chance)
+                .max(LOUDNESS_SIGMA * loudness_varies(blocks)),
         }
     }
 
@@ -179,8 +182,11 @@ pub(super) fn air_states(
     let loudest = ls.max(lm).max(le);
     let least = ls.min(lm).min(le);
     if entry_blocks.is_none() && loudest > 2.0 * least {
-        // The passage in or out may be the loudest part: air is as quiet as the quietest, not just quieter.
-        let quiet = |l: f64| l < QUIET * least;
+        // The passage in or out may be the loudest part: air is as quiet as the quietest, not just quieter. Noise that varies
+        // more has more to differ by, but a state nearer to the loudest is no air.
+        let varies = blocks.iter().map(loudness_varies).fold(0.0, f64::max);
+        let by_chance = (2.0 * LOUDNESS_SIGMA * varies * (2.0 / near as f64).sqrt()).exp();
+        let quiet = |l: f64| l < least * QUIET.max(by_chance.min((loudest / least).sqrt()));
         return (quiet(ls), quiet(le));
     }
 

@@ -107,3 +107,28 @@ fn a_wrong_dynamometer_matrix_is_told_with_the_right_one() {
         assert!(remedy.contains(right), "{wrong}: {remedy}");
     }
 }
+
+/// Up milling written down as down milling, in all cuts and in one: the mean forces fit coefficients all the same.
+#[test]
+fn a_wrong_milling_direction_is_told_with_the_right_angles() {
+    let (up, down) = (
+        "start_deg = 0.0\nexit_deg = 90.0",
+        "start_deg = 90.0\nexit_deg = 180.0",
+    );
+    for (cuts, place) in [(usize::MAX, "all cuts"), (1, "cut 01")] {
+        let copy = copy_of("force-9400");
+        let path = copy.path().join("campaign.toml");
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(up));
+        std::fs::write(&path, text.replacen(up, down, cuts)).unwrap();
+        let coefficients = document(&["cfc", copy.path().to_str().unwrap()]);
+        let found = finding(&coefficients).unwrap_or_else(|| panic!("{place}: {}", coefficients["setup"]));
+        assert_eq!(found["kind"], "milling-direction", "{found}");
+        assert_eq!(found["where"], place);
+        let remedy = found["remedy"].as_str().unwrap();
+        assert!(
+            remedy.contains("01: start_deg = 0.0, exit_deg = 90.0"),
+            "{remedy}"
+        );
+    }
+}

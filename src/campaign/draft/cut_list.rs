@@ -105,10 +105,27 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         .iter()
         .map(str::to_string)
         .collect();
+    let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().map_err(broken)?;
+    // A column that holds nothing but up and down says what it is, whatever it is called.
+    let is_direction = |i: usize| {
+        let mut words = rows
+            .iter()
+            .filter_map(|r| r.get(i))
+            .filter(|w| !w.is_empty())
+            .peekable();
+        words.peek().is_some() && words.all(|word| is_down(word).is_some())
+    };
     let (mut columns, mut passed_over) = (Vec::new(), Vec::new());
-    for name in &head {
-        let known = column(name, &keys())
+    for (i, name) in head.iter().enumerate() {
+        let named = column(name, &keys())
             .map_err(|problem| wrong(problem, skipped + 1, "write the unit in brackets: ap [mm]".into()))?;
+        let by_values = || {
+            is_direction(i).then_some(Column {
+                key: DIRECTION,
+                factor: 1.0,
+            })
+        };
+        let known = named.or_else(by_values);
         if known.is_none() && !name.is_empty() {
             if let Some(near) = closest(name, keys()) {
                 let problem = format!("unknown column {:?}", shown(name));
@@ -127,8 +144,7 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         .into());
     };
     let mut of_tool = OfTool::default();
-    for row in reader.records() {
-        let row = row.map_err(broken)?;
+    for row in &rows {
         let line = skipped + row.position().map_or(1, |p| p.line() as usize);
         let name = row[naming].replace('\\', "/");
         let has_number = row.iter().any(|cell| cell.contains(|c: char| c.is_ascii_digit()));

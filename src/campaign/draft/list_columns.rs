@@ -254,6 +254,13 @@ const NAMES: [(&str, &[&str]); 21] = [
     ),
 ];
 
+/// Names of a speed that may be that of the spindle or that of cutting.
+const SPEED: [&str; 4] = ["speed", "geschwindigkeit", "vitesse", "velocidad"];
+/// Units of turns a minute.
+const PER_MINUTE: [&str; 11] = [
+    "", "1/min", "min-1", "min^-1", "/min", "rpm", "u/min", "upm", "tr/min", "r/min", "rev/min",
+];
+
 /// A column whose meaning is known.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Column {
@@ -278,13 +285,20 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
             .find(|(_, names)| names.contains(&spaced))
             .map(|(key, _)| *key)
     };
+    let unit = plain(unit).replace([' ', '*'], "");
+    // A speed of which the unit alone says which.
+    let speed = SPEED.contains(&spaced.as_str()).then_some(match unit.as_str() {
+        "m/min" => Some(CUTTING_SPEED),
+        u if PER_MINUTE.contains(&u) && !u.is_empty() => Some("spindle_rpm"),
+        _ => None,
+    });
     let Some(key) = own
+        .or(speed.flatten())
         .or_else(|| NAMES.iter().find_map(named))
         .or_else(|| key_with_symbol(&spaced, &key_of))
     else {
         return Ok(None);
     };
-    let unit = plain(unit).replace([' ', '*'], "");
     let factor = |known: &[(&str, f64)]| {
         let found = known.iter().find(|(u, _)| *u == unit);
         found
@@ -314,11 +328,8 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
     let is = |known: &[(String, f64)]| known.iter().any(|(u, _)| *u == unit);
     let (key, factor) = match key {
         "spindle_rpm" => {
-            let per_minute = [
-                "", "1/min", "min-1", "min^-1", "/min", "rpm", "u/min", "upm", "tr/min", "r/min", "rev/min",
-            ];
             let per_second = ["1/s", "s-1", "s^-1", "hz", "rev/s", "u/s", "tr/s"];
-            let all: Vec<(&str, f64)> = per_minute
+            let all: Vec<(&str, f64)> = PER_MINUTE
                 .map(|u| (u, 1.0))
                 .into_iter()
                 .chain(per_second.map(|u| (u, 60.0)))
@@ -463,6 +474,8 @@ mod tests {
             ("n (1/s)", "spindle_rpm", 60.0),
             ("Vitesse de rotation (tr/min)", "spindle_rpm", 1.0),
             ("Velocidad de giro [rpm]", "spindle_rpm", 1.0),
+            ("Velocidad [rpm]", "spindle_rpm", 1.0),
+            ("Vitesse [m/min]", CUTTING_SPEED, 1.0),
             ("spindle_rpm", "spindle_rpm", 1.0),
             ("fz [µm]", "feed_per_tooth_mm", 1e-3),
             ("Avance par dent (mm/dent)", "feed_per_tooth_mm", 1.0),

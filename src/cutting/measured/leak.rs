@@ -37,7 +37,9 @@ pub(crate) fn high_pass<S: Sample>(
     let mean = |k: usize| turns[k * third..(k + 1) * third].iter().sum::<f64>() / third as f64;
     let (first, second) = (mean(0) - mean(1), mean(1) - mean(2));
     let ratio = second / first;
-    let scatter = robust_std(&turns[2 * third..]);
+    // Turn against turn, for the last third may still come back.
+    let steps: Vec<f64> = turns[2 * third..].windows(2).map(|w| w[1] - w[0]).collect();
+    let scatter = robust_std(&steps) / std::f64::consts::SQRT_2;
     if !(ratio > 0.0 && ratio < STRAIGHT) || first.abs() < SIGMAS * scatter {
         return None;
     }

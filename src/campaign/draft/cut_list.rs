@@ -105,7 +105,10 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         .iter()
         .map(str::to_string)
         .collect();
-    let rows: Vec<csv::StringRecord> = reader.records().collect::<Result<_, _>>().map_err(broken)?;
+    let rows: Vec<csv::StringRecord> = reader
+        .records()
+        .collect::<std::result::Result<_, _>>()
+        .map_err(broken)?;
     // A column that holds nothing but up and down says what it is, whatever it is called.
     let is_direction = |i: usize| {
         let mut words = rows

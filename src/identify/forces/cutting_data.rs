@@ -85,10 +85,10 @@ impl CutData {
         Some([cut.immersion.start_rad, cut.immersion.exit_rad].map(f64::to_degrees))
     }
 
-    /// Milled with more of the tool on one side of the feed than on the other: up or down milling.
+    /// Milled with more of the tool on one side of the feed than on the other, by 20° and more: up or down milling.
     pub fn is_one_sided(&self) -> bool {
         self.immersion_deg()
-            .is_some_and(|[start, exit]| (start + exit - 180.0).abs() > 1.0)
+            .is_some_and(|[start, exit]| (start + exit - 180.0).abs() >= 20.0)
     }
 
     /// One cut, the `index`-th of all, from its record and what was read off it.

@@ -3,16 +3,16 @@
 
 use rayon::prelude::*;
 
-use super::plausible::{coefficient, fit, improbability};
-use super::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS};
-use crate::Result;
+use super::plausible::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, coefficient, fit, improbability};
 use crate::cutting::USUAL;
 use crate::discrepancy::setup::SetupFinding;
 use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, cutting_nrms};
-use crate::identify::{Calibration, CuttingData, CuttingModel};
+use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
 
 /// One more cut is taken to be milled the other way where that leaves this part of the misfit.
 const CUT_BY_CUT: f64 = 0.7;
+/// Cuts that are tried for it: those that fit worst.
+const WORST: usize = 3;
 
 /// Records read with some of their cuts milled the other way.
 struct Mirrored {
@@ -39,23 +39,18 @@ impl Mirrored {
 }
 
 /// Cuts that were milled the other way, where the waveforms say so; with the misfit that is left then.
-///
-/// # Errors
-/// None so far; as its neighbours.
-pub(super) fn milling_direction(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
+pub(super) fn milling_direction(data: &CuttingData) -> Option<(SetupFinding, f64)> {
     let one_sided: Vec<usize> = (0..data.cuts.len())
         .filter(|i| data.cuts[*i].is_one_sided())
         .collect();
-    let Some(now) = fit(data) else { return Ok(None) };
-    if one_sided.is_empty() || now.reduced_chi2 < SUSPICIOUS {
-        return Ok(None);
+    if one_sided.is_empty() {
+        return None;
     }
+    let now = fit(data).filter(|now| now.reduced_chi2 >= SUSPICIOUS)?;
     let is_much_better = |m: &Mirrored| m.fit.reduced_chi2 < MUCH_BETTER * now.reduced_chi2;
     let all = Mirrored::new(data, one_sided.clone()).filter(is_much_better);
-    let found = all.or_else(|| cut_by_cut(data, &one_sided, now.reduced_chi2).filter(is_much_better));
-    let Some(found) = found.filter(|m| m.is_plausible() == Some(true)) else {
-        return Ok(None);
-    };
+    let found = all.or_else(|| cut_by_cut(data, &one_sided, &now).filter(is_much_better));
+    let found = found.filter(|m| m.is_plausible() == Some(true))?;
     let of_cut = |i: &usize| {
         let cut = &found.data.cuts[*i];
         let [start, exit] = cut.immersion_deg().unwrap_or_default();
@@ -90,20 +85,37 @@ pub(super) fn milling_direction(data: &CuttingData) -> Result<Option<(SetupFindi
             now.reduced_chi2,
         ),
     };
-    Ok(Some((finding, left)))
+    Some((finding, left))
 }
 
-/// Cut after cut turned round as long as that helps, the best first; at most half of them.
-fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: f64) -> Option<Mirrored> {
+/// Cut after cut turned round as long as that helps, of the worst ones the best first; at most half of them.
+fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: &Calibration) -> Option<Mirrored> {
     let mut best: Option<Mirrored> = None;
     for _ in 0..one_sided.len() / 2 {
-        let so_far = best.as_ref().map_or(&[][..], |m| &m.cuts);
-        let next = one_sided
-            .par_iter()
+        let (so_far, left, theta) = match &best {
+            Some(m) => (m.cuts.clone(), m.fit.reduced_chi2, &m.fit.theta),
+            None => (Vec::new(), now.reduced_chi2, &now.theta),
+        };
+        let read = best.as_ref().map_or(data, |m| &m.data);
+        let model = CuttingModel::new(read, true).ok()?;
+        let fits = CuttingProblem {
+            model: &model,
+            data: read,
+        }
+        .fits(theta)
+        .ok()?;
+        let misfit = |i: usize| fits[i].chi2 / read.cuts[i].value_count().max(1) as f64;
+        let mut worst: Vec<usize> = one_sided
+            .iter()
+            .copied()
             .filter(|i| !so_far.contains(i))
-            .filter_map(|i| Mirrored::new(data, [so_far, &[*i]].concat()))
+            .collect();
+        worst.sort_by(|a, b| misfit(*b).total_cmp(&misfit(*a)));
+        worst.truncate(WORST);
+        let next = worst
+            .into_par_iter()
+            .filter_map(|i| Mirrored::new(data, [so_far.as_slice(), &[i]].concat()))
             .min_by(|a, b| a.fit.reduced_chi2.total_cmp(&b.fit.reduced_chi2))?;
-        let left = best.as_ref().map_or(now, |m| m.fit.reduced_chi2);
         if next.fit.reduced_chi2 > CUT_BY_CUT * left {
             break;
         }

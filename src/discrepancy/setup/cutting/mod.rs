@@ -24,18 +24,12 @@ use crate::identify::forces::cutting_study::{
 };
 use crate::identify::{CuttingData, CuttingModel};
 use direction::milling_direction;
-use plausible::{coefficient, fit, improbability};
+use plausible::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, coefficient, fit, improbability};
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
-/// Another reading is believed for its waveform where it leaves this part of the misfit.
-const MUCH_BETTER: f64 = 0.4;
-/// Misfit per value above which the waveform says that something is wrong.
-const SUSPICIOUS: f64 = 1.3;
-/// Improbability (as χ²) of coefficients from which on they say that something is wrong.
-const IMPLAUSIBLE: f64 = 9.0;
 
 /// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels.
 ///
@@ -59,7 +53,7 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         return Ok(check);
     }
     // The waveform is cut from the other side, or seen from one: what leaves less is told.
-    let found = [milling_direction(data)?, dyno_axes(data)?];
+    let found = [milling_direction(data), dyno_axes(data)?];
     let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((finding, left)) = least {
         check.explained_share = 1.0;

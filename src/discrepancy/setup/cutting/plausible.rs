@@ -3,6 +3,13 @@
 use crate::identify::forces::cutting_study::calibrate_cutting;
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
+/// Another reading is believed for its waveform where it leaves this part of the misfit.
+pub(super) const MUCH_BETTER: f64 = 0.4;
+/// Misfit per value above which the waveform says that something is wrong.
+pub(super) const SUSPICIOUS: f64 = 1.3;
+/// Improbability (as χ²) of coefficients from which on they say that something is wrong.
+pub(super) const IMPLAUSIBLE: f64 = 9.0;
+
 pub(super) fn coefficient(calibration: &Calibration, name: &str) -> f64 {
     let found = calibration.parameters.iter().find(|p| p.name == name);
     found.map_or(0.0, |p| p.value)

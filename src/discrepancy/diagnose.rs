@@ -263,7 +263,7 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     fn run(mut self) -> Result<Diagnosis<S::Domain>> {
-        let (study, model) = (self.study, self.model);
+        let model = self.model;
         let (coarse_base, base, tried) = self.on_one_baseline()?;
         let mut refined = self.refine(&tried)?;
         let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
@@ -280,6 +280,26 @@ impl<'a, S: Study> Engine<'a, S> {
         if base_reduced < FAINT {
             self.begin_at_linear_sizes(&tried, &coarse_base, &base, &mut refined)?;
         }
+        let (diagnosis, alone) = self.conclude((&coarse_base, &base), &tried, &refined)?;
+        let Some(alone) = alone else { return Ok(diagnosis) };
+        // One choice of each effect.
+        refined.retain(|t| self.label(&t.instance) != self.label(&alone.instance));
+        put_among(&mut refined, [alone]);
+        Ok(self.conclude((&coarse_base, &base), &tried, &refined)?.0)
+    }
+
+    /// The verdict, from the fits of the model as it stands on the coarse view and on all data, those of every effect on the coarse
+    /// view and those of the leaders on all data. Besides, where several effects were tried together: one of them that alone explains
+    /// more than any of the leaders does, which began elsewhere.
+    #[allow(clippy::type_complexity)]
+    fn conclude(
+        &self,
+        (coarse_base, base): (&Fit, &Fit),
+        tried: &[TriedOf<S>],
+        refined: &[TriedOf<S>],
+    ) -> Result<(Diagnosis<S::Domain>, Option<TriedOf<S>>)> {
+        let (study, model) = (self.study, self.model);
+        let base_reduced = 2.0 * base.cost / self.freedom(model, Extent::Full);
         let base_residual = study.residual(model, &base.theta)?;
         // Where even the best explanation leaves more than noise, that rest scales what counts as chance, and its
         // correlation from value to value says how many of them are independent.
@@ -314,14 +334,14 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(|t| !labels.contains(&self.label(&t.instance)));
         let all: Vec<(&TriedOf<S>, &Fit)> = refined
             .iter()
-            .map(|t| (t, &base))
-            .chain(rest.map(|t| (t, &coarse_base)))
+            .map(|t| (t, base))
+            .chain(rest.map(|t| (t, coarse_base)))
             .collect();
         let mut candidates: Vec<CandidateOf<S>> = all
             .par_iter()
             .map(|(t, without)| {
-                let (tried, vanished) = self.nested(t, without, &base);
-                let refined = vanished || std::ptr::eq(*without, &base);
+                let (tried, vanished) = self.nested(t, without, base);
+                let refined = vanished || std::ptr::eq(*without, base);
                 let judged = self.judge(&tried, refined, &evidence)?;
                 Ok(EffectCandidate { vanished, ..judged })
             })
@@ -332,7 +352,7 @@ impl<'a, S: Study> Engine<'a, S> {
             residual: base_residual,
             reduced_chi2: base_reduced,
             rest: base_rest,
-            theta: base.theta,
+            theta: base.theta.clone(),
             calibration: self.calibration.clone(),
         };
 
@@ -346,7 +366,7 @@ impl<'a, S: Study> Engine<'a, S> {
         self.test_rests(&mut candidates, &credible)?;
         let winner = credible.iter().position(|c| *c);
         let leader = self.excuse(&mut baseline, &mut candidates, winner)?;
-        let mut pairs = None;
+        let (mut pairs, mut alone) = (None, None);
         // What explains more than the winner, were its size possible, may be possible beside another.
         let leading: Vec<bool> = candidates
             .iter()
@@ -361,8 +381,10 @@ impl<'a, S: Study> Engine<'a, S> {
                 if verdict::leaves_room(&candidates[w], &baseline)
                     && candidates[w].share_above_noise(&baseline) > PAIR_SHARE =>
             {
-                let (best, counts) = self.best_set(&candidates, &leading, &evidence)?;
+                let (best, counts, last) = self.best_set(&candidates, &leading, &evidence)?;
                 pairs = Some(counts);
+                let lowest = refined.iter().map(|t| t.fit.cost).fold(base.cost, f64::min);
+                alone = last.filter(|t| t.fit.cost < lowest * (1.0 - BETTER));
                 best
             }
             _ => None,
@@ -381,7 +403,7 @@ impl<'a, S: Study> Engine<'a, S> {
                 indistinguishable: Vec::new(),
             };
         }
-        Ok(Diagnosis {
+        let diagnosis = Diagnosis {
             too_little_data,
             verdict: decision.verdict,
             effect: decision.effect,
@@ -391,9 +413,10 @@ impl<'a, S: Study> Engine<'a, S> {
             companions: decision.companions,
             candidates,
             baseline,
-            not_tried: self.not_tried,
+            not_tried: self.not_tried.clone(),
             pairs,
-        })
+        };
+        Ok((diagnosis, alone))
     }
 
     /// Tests what the leading credible candidates leave for structure.
@@ -714,13 +737,14 @@ impl<'a, S: Study> Engine<'a, S> {
     }
 
     /// The effects that explain most together: the best pair with one that leads, and where every pair leaves more than noise of what
-    /// is plain, the best three.
+    /// is plain, the best three. Besides, what came last into those that leave least, alone.
+    #[allow(clippy::type_complexity)]
     fn best_set(
         &self,
         candidates: &[CandidateOf<S>],
         leading: &[bool],
         evidence: &Evidence,
-    ) -> Result<(Option<EffectSet>, [usize; 2])> {
+    ) -> Result<(Option<EffectSet>, [usize; 2], Option<TriedOf<S>>)> {
         let mut counts = [0, 0];
         let mut best: Option<EffectSet> = None;
         let answers = |best: &Option<EffectSet>| best.as_ref().is_some_and(|b| b.odds_against() < 1.0);
@@ -751,7 +775,8 @@ impl<'a, S: Study> Engine<'a, S> {
             }
             // Effects that leave only noise are the answer; other leaders cannot do better.
             if answers(&best) {
-                return Ok((best, counts));
+                let last = self.last_alone(pairs.iter().map(|(pair, _)| pair))?;
+                return Ok((best, counts, last));
             }
         }
         pairs.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
@@ -778,8 +803,12 @@ impl<'a, S: Study> Engine<'a, S> {
                 threes.push(three);
             }
             if answers(&best) {
-                return Ok((best, counts));
+                break;
             }
+        }
+        let last = self.last_alone(pairs.iter().map(|(pair, _)| pair).chain(&threes))?;
+        if answers(&best) {
+            return Ok((best, counts, last));
         }
         // So many parameters at once may have stopped on their way: what explains nearly all is fitted as the model was, where that
         // does not take long.
@@ -794,7 +823,28 @@ impl<'a, S: Study> Engine<'a, S> {
             let fresh = self.together(three.parts.clone(), three.model.clone(), fit)?;
             self.keep_better(&mut best, &fresh, (candidates, leading), evidence)?;
         }
-        Ok((best, counts))
+        Ok((best, counts, last))
+    }
+
+    /// Of the set that leaves least, the effect that came last, without the others: they may only have led to where it explains all.
+    fn last_alone<'t>(&self, sets: impl Iterator<Item = &'t Together<S>>) -> Result<Option<TriedOf<S>>>
+    where
+        S: 't,
+    {
+        let Some(best) = sets.min_by(|a, b| a.cost.total_cmp(&b.cost)) else {
+            return Ok(None);
+        };
+        let Some((instance, own)) = best.parts.last() else {
+            return Ok(None);
+        };
+        let model = self.study.extend(self.model, instance);
+        let (front, last) = (
+            &best.theta[..self.base_count],
+            &best.theta[best.theta.len() - own..],
+        );
+        let fit = self.minimise(&model, View::FULL, &[front, last].concat(), REFINE)?;
+        let instance = *instance;
+        Ok(Some(Tried { instance, model, fit }))
     }
 
     /// Effects besides those of `leader` at the sizes that they would have were the response linear in them, most gain first.

@@ -41,6 +41,11 @@ pub enum DrawnForm {
     RotorOnSpring,
     /// Under the base only: what the robot stands on, a mass on a spring along a direction of its own, near an axis.
     FloorMode,
+    /// Base and bearings only: a spring that gives way alike along (or about) two axes: a foot plate's x and y, all that is across a
+    /// bearing.
+    IsotropicSpring,
+    /// The same with a damper of its own.
+    IsotropicSpringDamper,
 }
 
 impl DrawnForm {
@@ -58,6 +63,8 @@ impl DrawnForm {
             DrawnForm::ObliqueSpringDamper => "oblique-spring-damper",
             DrawnForm::RotorOnSpring => "rotor-on-spring",
             DrawnForm::FloorMode => "floor-mode",
+            DrawnForm::IsotropicSpring => "isotropic-spring",
+            DrawnForm::IsotropicSpringDamper => "isotropic-spring-damper",
         }
     }
 
@@ -75,7 +82,25 @@ impl DrawnForm {
             DrawnForm::ObliqueSpringDamper => "an oblique spring damper",
             DrawnForm::RotorOnSpring => "a rotor on a spring",
             DrawnForm::FloorMode => "a floor mode",
+            DrawnForm::IsotropicSpring => "an isotropic spring",
+            DrawnForm::IsotropicSpringDamper => "an isotropic spring damper",
         }
+    }
+
+    /// Where it is, in words.
+    pub fn place_in_words(self, spot: Spot) -> String {
+        match self.is_isotropic() {
+            true => spot.words_of_both(),
+            false => spot.words(),
+        }
+    }
+
+    /// Whether it acts alike along two axes.
+    pub fn is_isotropic(self) -> bool {
+        matches!(
+            self,
+            DrawnForm::IsotropicSpring | DrawnForm::IsotropicSpringDamper
+        )
     }
 
     fn suits(self, spot: Spot) -> bool {
@@ -94,6 +119,7 @@ impl DrawnForm {
             DrawnForm::ObliqueSpringDamper => matches!(spot, Spot::LinkGround(..) | Spot::ToolGround(_)),
             DrawnForm::RotorOnSpring => is_drive,
             DrawnForm::FloorMode => matches!(spot, Spot::Base(0..=2)),
+            DrawnForm::IsotropicSpring | DrawnForm::IsotropicSpringDamper => spot.alike().is_some(),
         }
     }
 }
@@ -104,7 +130,7 @@ pub fn forms(spot: Spot) -> Vec<DrawnForm> {
 }
 
 /// All forms, in the order of their variants: one list for all spots, so that a variant means one form everywhere.
-const FORMS: [DrawnForm; 11] = [
+const FORMS: [DrawnForm; 13] = [
     DrawnForm::Spring,
     DrawnForm::Damper,
     DrawnForm::SpringDamper,
@@ -116,6 +142,8 @@ const FORMS: [DrawnForm; 11] = [
     DrawnForm::RotorOnSpring,
     DrawnForm::ObliqueSpringDamper,
     DrawnForm::FloorMode,
+    DrawnForm::IsotropicSpring,
+    DrawnForm::IsotropicSpringDamper,
 ];
 
 /// Acts on a displacement that the model has.
@@ -160,9 +188,9 @@ pub fn dynamic_stiffness(spot: Spot, form: DrawnForm, values: &[f64], frequency_
         -own[0] * omega * omega * spring / (spring - omega * omega)
     };
     match form {
-        DrawnForm::Spring => complex(values[0], 0.0),
+        DrawnForm::Spring | DrawnForm::IsotropicSpring => complex(values[0], 0.0),
         DrawnForm::Damper => complex(0.0, omega * values[0]),
-        DrawnForm::SpringDamper => complex(values[0], omega * values[1]),
+        DrawnForm::SpringDamper | DrawnForm::IsotropicSpringDamper => complex(values[0], omega * values[1]),
         // Along the axis, from which the direction leans away.
         DrawnForm::ObliqueSpringDamper => {
             complex(values[0], omega * values[1]) / (1.0 + values[2].powi(2) + values[3].powi(2))
@@ -209,9 +237,9 @@ fn parameters(site: Site, variant: usize, data: &DataSummary) -> Vec<Parameter> 
     let usual = if spot.is_series() { 1e7 } else { 1e5 };
     let resonator = || branch::parameters(data, 5.0, 15.0);
     match form_of(variant) {
-        DrawnForm::Spring => vec![stiffness(usual)],
+        DrawnForm::Spring | DrawnForm::IsotropicSpring => vec![stiffness(usual)],
         DrawnForm::Damper => vec![damping],
-        DrawnForm::SpringDamper => vec![stiffness(usual), damping],
+        DrawnForm::SpringDamper | DrawnForm::IsotropicSpringDamper => vec![stiffness(usual), damping],
         DrawnForm::ObliqueSpringDamper => [stiffness(usual), damping]
             .into_iter()
             .chain(leans(spot))
@@ -261,6 +289,28 @@ fn oblique_axes(spot: Spot) -> [usize; 2] {
     [(along + 1) % 3, (along + 2) % 3]
 }
 
+/// A form of these natural values whose direction leans further than half-way towards another axis, as one of that axis: its spot
+/// there, and the values. `None` where it is named after the right axis.
+pub fn along_its_axis(spot: Spot, form: DrawnForm, values: &[f64]) -> Option<(Spot, Vec<f64>)> {
+    if !matches!(form, DrawnForm::ObliqueSpringDamper | DrawnForm::FloorMode) {
+        return None;
+    }
+    let (sizes, leans) = values.split_at(values.len().checked_sub(2)?);
+    let mut components = [1.0; 3];
+    for (axis, lean) in oblique_axes(spot).into_iter().zip(leans) {
+        components[axis] = *lean;
+    }
+    let most = (0..3).max_by(|a, b| components[*a].abs().total_cmp(&components[*b].abs()))?;
+    let renamed = match spot {
+        Spot::LinkGround(link, _) => Spot::LinkGround(link, most),
+        Spot::ToolGround(_) => Spot::ToolGround(most),
+        Spot::Base(_) => Spot::Base(most),
+        _ => return None,
+    };
+    let leans = oblique_axes(renamed).map(|axis| components[axis] / components[most]);
+    (components[most].abs() > 1.0).then(|| (renamed, [sizes, &leans].concat()))
+}
+
 /// Starts of an oblique form of these sizes: along the axis, and leaning.
 pub fn leaning(sizes: &[f64]) -> Vec<Vec<f64>> {
     [[0.0, 0.0], [0.7, 0.0], [-0.7, 0.0], [0.0, 0.7], [0.0, -0.7]]
@@ -278,9 +328,11 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
         &[1e3, 1e4, 1e6, 1e7]
     };
     match form_of(variant) {
-        DrawnForm::Spring => scale.iter().map(|k| vec![*k]).collect(),
+        DrawnForm::Spring | DrawnForm::IsotropicSpring => scale.iter().map(|k| vec![*k]).collect(),
         DrawnForm::Damper => [10.0, 100.0, 1e4].map(|c| vec![c]).to_vec(),
-        DrawnForm::SpringDamper => scale.iter().map(|k| vec![*k, 1e-3 * k]).collect(),
+        DrawnForm::SpringDamper | DrawnForm::IsotropicSpringDamper => {
+            scale.iter().map(|k| vec![*k, 1e-3 * k]).collect()
+        }
         DrawnForm::ObliqueSpringDamper => leaning(&[1e5, 1e2]),
         DrawnForm::Mass => [0.2, 1.0, 10.0, 50.0].map(|m| vec![m]).to_vec(),
         DrawnForm::Resonator => branch::starts(data, peaks_hz, 5.0),
@@ -552,7 +604,10 @@ impl Effect<Structure> for DrawnBranch {
                 attach(chain, &spring, AttachmentLaw::Spring, &values[0]);
                 attach(chain, &damper, AttachmentLaw::Damper, &values[1]);
             }
-            DrawnForm::RotorOnSpring | DrawnForm::FloorMode => (),
+            DrawnForm::RotorOnSpring
+            | DrawnForm::FloorMode
+            | DrawnForm::IsotropicSpring
+            | DrawnForm::IsotropicSpringDamper => (),
         }
     }
 }
@@ -620,7 +675,15 @@ impl Effect<Structure> for Series {
             point: None,
         };
         let form = form_of(variant);
-        let damped = matches!(form, DrawnForm::SpringDamper | DrawnForm::RotorOnSpring);
+        let other = spot.alike().filter(|_| form.is_isotropic());
+        let other = other.and_then(|spot| spot.twist(setting.kinematics));
+        let directions: Vec<Vector6<f64>> = std::iter::once(twist)
+            .chain(other.map(|(_, _, twist)| twist))
+            .collect();
+        let damped = matches!(
+            form,
+            DrawnForm::SpringDamper | DrawnForm::RotorOnSpring | DrawnForm::IsotropicSpringDamper
+        );
         chain.elements.push(Element {
             role: if place.link == 0 {
                 Role::Base
@@ -629,8 +692,8 @@ impl Effect<Structure> for Series {
             },
             place,
             at,
-            directions: vec![twist],
-            shape: DMatrix::identity(1, 1),
+            shape: DMatrix::identity(directions.len(), directions.len()),
+            directions,
             stiffness: values[0].clone(),
             damping: damped.then(|| values[1].clone()),
         });
@@ -723,5 +786,63 @@ mod tests {
         let difference = chain.system(0).mass - light.system(0).mass;
         assert!((difference.trace() - 3.0 * 0.75 * mass_kg).abs() < 1e-6 * mass_kg);
         assert!((chain.system(0).stiffness - light.system(0).stiffness).norm() < 1e-3 * stiffness);
+    }
+
+    /// Whichever axis an oblique spring is named after, it is the same spring.
+    #[test]
+    fn an_oblique_spring_is_named_after_the_axis_it_mostly_follows() {
+        let robot = RobotModel::new(irb6640());
+        let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
+        let setting = PostureSetting::of_tests(&robot, &kinematics);
+        let stiffness = |spot, values: &[f64]| {
+            let mut chain = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+            let at = At {
+                site: Site::At(spot),
+                variant: number(DrawnForm::ObliqueSpringDamper),
+            };
+            let values: Vec<Dual> = values.iter().map(|v| Dual::constant(*v)).collect();
+            DrawnBranch.apply(at, &values, &setting, &mut chain);
+            chain.system(0).stiffness
+        };
+        let form = DrawnForm::ObliqueSpringDamper;
+        // Direction (0.5, 1, −2): of z.
+        let (spot, values) = (Spot::ToolGround(1), [4e5, 300.0, -2.0, 0.5]);
+        let (renamed, own) = along_its_axis(spot, form, &values).unwrap();
+        assert_eq!(
+            (renamed, own.as_slice()),
+            (Spot::ToolGround(2), &[4e5, 300.0, -0.25, -0.5][..])
+        );
+        let difference = stiffness(renamed, &own) - stiffness(spot, &values);
+        assert!(difference.norm() < 1e-9 * stiffness(spot, &values).norm());
+        assert!(along_its_axis(spot, form, &[4e5, 300.0, 0.9, -1.0]).is_none());
+        assert!(along_its_axis(spot, DrawnForm::Resonator, &[5.0, 27.0, 3.0]).is_none());
+        let floor = along_its_axis(Spot::Base(2), DrawnForm::FloorMode, &[2e3, 20.0, 0.03, 2.0, 1.0]);
+        assert_eq!(floor.unwrap(), (Spot::Base(0), vec![2e3, 20.0, 0.03, 0.5, 0.5]));
+    }
+
+    /// A force on the arm finds the foot plate's stiffness along x and y alike, and only there; the model's own dissipation is kept.
+    #[test]
+    fn an_isotropic_spring_gives_way_along_two_axes() {
+        let robot = RobotModel::new(irb6640());
+        let kinematics = robot.kinematics(&TAP_POSTURES[0]).unwrap();
+        let setting = PostureSetting::of_tests(&robot, &kinematics);
+        let bare = robot.chain(&kinematics, &Baseline::nominal(&robot.spec));
+        let tool = |chain: &Chain| {
+            let gained = chain.compliance(kinematics.tcp(), robot.flange_place()).unwrap();
+            gained.fixed_view::<3, 3>(0, 0).into_owned()
+        };
+        let k = 5e6;
+        for form in [DrawnForm::IsotropicSpring, DrawnForm::IsotropicSpringDamper] {
+            let mut chain = bare.clone();
+            let at = At {
+                site: Site::At(Spot::Base(0)),
+                variant: number(form),
+            };
+            Series.apply(at, &[k, 400.0].map(Dual::constant), &setting, &mut chain);
+            let expected = nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.0)) / k;
+            assert!((tool(&chain) - tool(&bare) - expected).norm() < 1e-9 * expected.norm());
+        }
+        assert!(forms(Spot::Base(1)).iter().all(|form| !form.is_isotropic()));
+        assert!(forms(Spot::Bearing(3, 3)).contains(&DrawnForm::IsotropicSpring));
     }
 }

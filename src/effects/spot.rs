@@ -57,6 +57,17 @@ impl Spot {
         }
     }
 
+    /// In words, of this and the displacement that is [alike](Self::alike): `under the base (x and y)`.
+    pub fn words_of_both(self) -> String {
+        match (self, self.alike()) {
+            (Spot::Base(k), Some(Spot::Base(l))) => format!("under the base ({} and {})", BASE[k], BASE[l]),
+            (Spot::Bearing(i, k), Some(Spot::Bearing(_, l))) => {
+                format!("in the bearing of joint {i} ({} and {})", BEARING[k], BEARING[l])
+            }
+            _ => self.words(),
+        }
+    }
+
     /// Something of the model's own displacement is changed there.
     pub fn parallel(robot: &RobotSpec) -> Vec<Spot> {
         let joints = (1..=robot.joints.len()).map(Spot::Joint);
@@ -80,6 +91,16 @@ impl Spot {
                 (Spot::ToolGround(_), Spot::ToolGround(_)) | (Spot::Base(_), Spot::Base(_)) => true,
                 _ => false,
             }
+    }
+
+    /// The second of two displacements of a support along which it is often as stiff as along this one, the first: what shifts or tilts
+    /// across an axis.
+    pub fn alike(self) -> Option<Spot> {
+        match self {
+            Spot::Base(k @ (0 | 3)) => Some(Spot::Base(k + 1)),
+            Spot::Bearing(i, k @ (0 | 3)) => Some(Spot::Bearing(i, k + 1)),
+            _ => None,
+        }
     }
 
     /// A displacement that the model does not have is added there.

@@ -262,6 +262,8 @@ pub enum Effort {
     Direct,
     /// Besides, the rough misfit leads from every base where the likelihood's starting points are all far off.
     Staged,
+    /// The same on a glance at the data, for what is so large that it shows there.
+    StagedAtAGlance,
 }
 
 /// Starting points that get a step.
@@ -309,9 +311,10 @@ pub fn look<S: Study>(
 ) -> Result<Vec<Fit>> {
     let bounds = model.bounds();
     let extent = match effort {
-        Effort::Look => Extent::Glance,
+        Effort::Look | Effort::StagedAtAGlance => Extent::Glance,
         Effort::Direct | Effort::Staged => Extent::Coarse,
     };
+    let staged = matches!(effort, Effort::Staged | Effort::StagedAtAGlance);
     let view = |measure| View {
         extent,
         measure,
@@ -342,7 +345,7 @@ pub fn look<S: Study>(
     // for it yet.
     let of_linear_size = match effort {
         Effort::Look => bases,
-        Effort::Direct | Effort::Staged => &[],
+        Effort::Direct | Effort::Staged | Effort::StagedAtAGlance => &[],
     }
     .iter()
     .filter_map(|base| Some(linear_size(&likelihood, model, base)?.theta));
@@ -366,7 +369,7 @@ pub fn look<S: Study>(
     for (_, step) in steps.iter().take(if effort == Effort::Look { 1 } else { 2 }) {
         keep(minimise(&likelihood, step, &bounds, LOOK));
     }
-    if effort == Effort::Staged && 2.0 * best > TRAP_MISFIT * study.real_values(Extent::Coarse) as f64 {
+    if staged && 2.0 * best > TRAP_MISFIT * study.real_values(extent) as f64 {
         let longer = Stopping {
             max_iterations: 10,
             ..LOOK
@@ -518,17 +521,27 @@ pub struct Looked<D: Modelled> {
 /// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
 const OUT_OF_RACE: f64 = 10.0;
 
-/// Follows each to its end on the coarse view; those out of the race after the first steps stay where these ended. In the order
-/// given; `None` where the fit failed.
-pub fn race<S: Study>(study: &S, looked: Vec<Looked<S::Domain>>) -> Vec<Option<Tried<S::Domain>>> {
-    let lowest = looked
-        .iter()
-        .map(|l| l.fits[0].cost)
-        .fold(f64::INFINITY, f64::min);
+/// Follows each to its end on the coarse view; those out of the race after the first steps, or not among so
+/// many of the first (`most`), stay where these ended. In the order given; `None` where the fit failed.
+pub fn race<S: Study>(
+    study: &S,
+    looked: Vec<Looked<S::Domain>>,
+    most: usize,
+) -> Vec<Option<Tried<S::Domain>>> {
+    let mut costs: Vec<f64> = looked.iter().map(|l| l.fits[0].cost).collect();
+    costs.sort_by(f64::total_cmp);
+    let lowest = costs.first().copied().unwrap_or(f64::INFINITY);
+    let highest = costs.get(most).copied().unwrap_or(f64::INFINITY);
+    let is_in = |cost: f64| cost <= OUT_OF_RACE * lowest && cost < highest;
     let followed = looked.into_par_iter().map(|mut looked| {
-        let fit = match looked.fits[0].cost <= OUT_OF_RACE * lowest {
+        let fit = match is_in(looked.fits[0].cost) {
             true => settle(study, &looked.model, &looked.fits).ok()?,
-            false => looked.fits.swap_remove(0),
+            false => {
+                // The first steps may have been on a glance.
+                let fit = looked.fits.swap_remove(0);
+                let cost = study.problem(&looked.model, View::COARSE).cost(&fit.theta).ok()?;
+                Fit { cost, ..fit }
+            }
         };
         Some(Tried {
             instance: looked.instance,
@@ -621,7 +634,7 @@ pub fn try_effects<'i, S: Study>(
         done();
     }
     looks.extend(look_at(promising));
-    race(study, looks).into_iter().flatten().collect()
+    race(study, looks, usize::MAX).into_iter().flatten().collect()
 }
 
 /// Candidates that [`try_again`] follows.

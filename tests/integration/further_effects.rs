@@ -106,3 +106,20 @@ fn what_the_data_draw_gets_its_name() {
     assert!(found["lead"].is_null());
     assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.2);
 }
+
+/// The leader is another effect of an impossible size, beside which the right one is found: it alone explains all. The verdict was the
+/// leader.
+#[test]
+fn an_effect_that_only_led_to_the_right_one_is_dropped() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    let arguments = ["simulate", "--out", path, "--seed", "1960026", "--kind", "direct"];
+    let hidden = ["--effect", "bearing-compliance", "--lines-hz", "1.0"];
+    document(&[&arguments[..], &hidden].concat());
+    let found = document(&["diagnose", path]);
+    assert_eq!(found["effect"], "bearing-compliance", "{found:#}");
+    assert_eq!(found["site"], "joint-5");
+    assert!(found["companion"].is_null());
+    assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.2);
+}

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::cutting::measured::cut_analysis::Notice;
 use crate::data::Sample;
-use crate::signal::{SignalBlocks, robust_std};
+use crate::signal::{self, SignalBlocks, robust_std};
 
 pub(crate) const HIGH_PASS: &str = "a high-pass takes the mean force away: where the cut ends the zero stands on the other side and comes back; \
      set the amplifier to its long time constant and the input to DC, and cut again (averages and coefficients of this \
@@ -20,15 +20,16 @@ const SIGMAS: f64 = 6.0;
 /// Turns of each third, at least.
 const LEAST_TURNS: usize = 4;
 
-/// Of one channel: `force` as recorded in the steady window, against the zero before the cut; samples a turn and a second.
+/// Of one channel, from the air before the cut, its steady window and the air after it; samples a turn and a second.
 pub(crate) fn high_pass<S: Sample>(
     channel: &str,
     values: &[S],
-    after: &Range<usize>,
-    force: f64,
+    [before, steady, after]: [&Range<usize>; 3],
     (turn, rate): (f64, f64),
 ) -> Option<Notice> {
     let own = values.get(after.clone())?;
+    let level = |range: &Range<usize>| values.get(range.clone()).map_or(0.0, signal::mean);
+    let force = level(steady) - level(before);
     let turns = SignalBlocks::of(own.len(), |i| own[i].value(), turn).mean;
     let third = turns.len() / 3;
     if third < LEAST_TURNS {
@@ -73,9 +74,12 @@ mod tests {
                 now - low + drift_per_s * t + noise
             })
             .collect();
-        let steady: Vec<f64> = values[5500..9500].to_vec();
-        let force = steady.iter().sum::<f64>() / steady.len() as f64;
-        high_pass("Fx", &values, &(10_300..15_000), force, (TURN, RATE))
+        high_pass(
+            "Fx",
+            &values,
+            [&(0..4900), &(5500..9500), &(10_300..15_000)],
+            (TURN, RATE),
+        )
     }
 
     #[test]

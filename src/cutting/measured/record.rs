@@ -178,22 +178,18 @@ pub fn analyse_cut<S: Sample>(
             });
         }
     }
-    let carriers: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
-    air_notices(&phases.air, &carriers, samples as f64 / rate, &mut notices);
-    for ((axis, _, values), channel) in usable.iter().zip(&channels) {
-        let Air {
-            before: Some(before),
-            after: Some(after),
-        } = &phases.air
-        else {
-            continue;
-        };
-        let level = |range: &Range<usize>| values.get(range.clone()).map_or(0.0, signal::mean);
-        let force = level(&steady) - level(before);
-        let at = (samples_per_revolution, rate);
-        if carrying.contains(&channel.axis) {
-            notices.extend(high_pass(axis.label(), values, after, force, at));
-        }
+    let own: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
+    air_notices(&phases.air, &own, samples as f64 / rate, &mut notices);
+    if let (Some(before), Some(after)) = (&phases.air.before, &phases.air.after) {
+        let told = carriers.iter().filter_map(|(axis, values)| {
+            high_pass(
+                axis.label(),
+                values,
+                [before, &steady, after],
+                (samples_per_revolution, rate),
+            )
+        });
+        notices.extend(told);
     }
     unsteady_notice(
         &usable,

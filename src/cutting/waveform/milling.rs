@@ -134,30 +134,26 @@ impl MillingCut {
     /// An edge that is not straight is summed up slice by slice.
     pub fn closed_form(&self, orders: usize) -> UnitForces {
         let mut unit = Self::nothing(orders);
-        let orders = (0..=orders).step_by(self.teeth);
+        let window = |immersion: Immersion| ImmersionWindow::new(immersion, orders);
+        let multiples = (0..=orders).step_by(self.teeth);
         let teeth = self.teeth as f64;
         let Some(shape) = self.shape else {
-            for n in orders {
+            let window = window(self.immersion);
+            for n in multiples {
                 let factor = self.helix(n) * teeth;
-                self.add_slice(&mut unit, n, self.immersion, [factor; 2], (1.0, 0.0));
+                self.add_slice(&mut unit, n, &window, [factor; 2], (1.0, 0.0));
             }
             return unit;
         };
         for slice in shape.slices(self.axial_depth_mm, self.immersion) {
-            let Some(immersion) = slice.immersion else {
+            let Some(window) = slice.immersion.map(window) else {
                 continue;
             };
-            for n in orders.clone() {
+            for n in multiples.clone() {
                 let lag = n as f64 * self.lag_rad * slice.height_mm / self.axial_depth_mm;
                 let turn = Complex64::from_polar(teeth, -lag);
                 let factors = [turn * slice.depth_mm, turn * slice.length_mm()];
-                self.add_slice(
-                    &mut unit,
-                    n,
-                    immersion,
-                    factors,
-                    (slice.sin_kappa, slice.cos_kappa),
-                );
+                self.add_slice(&mut unit, n, &window, factors, (slice.sin_kappa, slice.cos_kappa));
             }
         }
         unit
@@ -168,21 +164,13 @@ impl MillingCut {
         &self,
         unit: &mut UnitForces,
         n: usize,
-        immersion: Immersion,
+        window: &ImmersionWindow,
         [depth, length]: [Complex64; 2],
         (sin_kappa, cos_kappa): (f64, f64),
     ) {
-        let i = Complex64::I;
-        let w = |m: i64| window(immersion, n as i64 + m);
-        // cos φ, sin φ, sin φ cos φ and sin² φ by Euler's formulas.
-        let cos = 0.5 * (w(-1) + w(1));
-        let sin = (w(-1) - w(1)) / (2.0 * i);
-        let sin_cos = (w(-2) - w(2)) / (4.0 * i);
-        let sin_sin = 0.5 * w(0) - 0.25 * (w(-2) + w(2));
+        let integral = window.integrals(n);
         let cut = depth * self.feed_per_tooth_mm;
-        for (first, factor, [cos, sin, one]) in
-            [(0, cut, [sin_cos, sin_sin, sin]), (3, length, [cos, sin, w(0)])]
-        {
+        for (first, factor, [cos, sin, one]) in [(0, cut, integral.by_sine), (3, length, integral.plain)] {
             let mut add =
                 |k: usize, axis: usize, value: Complex64| unit[first + k][axis][n] += value * factor;
             add(0, 0, -cos);
@@ -470,15 +458,59 @@ fn waves(directions: &[Direction], step: usize, rows: usize) -> Vec<f64> {
     waves
 }
 
-/// (1/2π) ∫ e^{−imφ} dφ over an immersion.
-fn window(immersion: Immersion, m: i64) -> Complex64 {
-    let Immersion { start_rad, exit_rad } = immersion;
-    if m == 0 {
-        return Complex64::from((exit_rad - start_rad) / TAU);
+/// e^{−inφ} of one angle, for all orders.
+pub(super) struct Turns(Vec<Complex64>);
+
+impl Turns {
+    /// Up to `orders` of either sign.
+    pub(super) fn new(angle_rad: f64, orders: usize) -> Turns {
+        let one = Complex64::from_polar(1.0, -angle_rad);
+        let powers = std::iter::successors(Some(Complex64::ONE), |at| Some(at * one));
+        Turns(powers.take(orders + 1).collect())
     }
-    let m = m as f64;
-    let end = |angle: f64| Complex64::from_polar(1.0, -m * angle);
-    (end(exit_rad) - end(start_rad)) * Complex64::new(0.0, 1.0 / (TAU * m))
+
+    pub(super) fn at(&self, order: i64) -> Complex64 {
+        let turn = self.0[order.unsigned_abs() as usize];
+        if order < 0 { turn.conj() } else { turn }
+    }
+}
+
+/// An immersion as an integral over it sees it.
+pub(super) struct ImmersionWindow {
+    immersion: Immersion,
+    /// Of the angles that it begins and ends at.
+    pub(super) ends: [Turns; 2],
+}
+
+impl ImmersionWindow {
+    /// For integrands of up to `orders`.
+    pub(super) fn new(immersion: Immersion, orders: usize) -> ImmersionWindow {
+        let ends = [immersion.start_rad, immersion.exit_rad].map(|at| Turns::new(at, orders + 2));
+        ImmersionWindow { immersion, ends }
+    }
+
+    /// (1/2π) ∫ {cos φ, sin φ, 1} e^{−inφ} dφ as it is and with sin φ besides, by Euler's formulas.
+    pub(super) fn integrals(&self, n: usize) -> Integrals {
+        let i = Complex64::I;
+        let w = [-2i64, -1, 0, 1, 2].map(|m| match n as i64 + m {
+            0 => Complex64::from((self.immersion.exit_rad - self.immersion.start_rad) / TAU),
+            order => (self.ends[1].at(order) - self.ends[0].at(order)) * (i / (TAU * order as f64)),
+        });
+        let cos = 0.5 * (w[1] + w[3]);
+        let sin = (w[1] - w[3]) / (2.0 * i);
+        let sin_cos = (w[0] - w[4]) / (4.0 * i);
+        let sin_sin = 0.5 * w[2] - 0.25 * (w[0] + w[4]);
+        Integrals {
+            plain: [cos, sin, w[2]],
+            by_sine: [sin_cos, sin_sin, sin],
+        }
+    }
+}
+
+/// [`ImmersionWindow::integrals`].
+pub(super) struct Integrals {
+    pub(super) plain: [Complex64; 3],
+    pub(super) by_sine: [Complex64; 3],
 }
 
 /// Where the edge of a tooth stands.

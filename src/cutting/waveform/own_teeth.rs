@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::milling::{MillingCut, UnitForces};
+use super::milling::{ImmersionWindow, MillingCut, Turns, UnitForces};
 use super::tooth_place::ToothPlace;
 use crate::data::Immersion;
 
@@ -77,10 +77,10 @@ impl MillingCut {
             for stretch in self.stretches(&places, j) {
                 let before = (j + stretch.passes) % teeth;
                 let Immersion { start_rad, exit_rad } = stretch.immersion;
-                let ends = [start_rad, exit_rad].map(|at| Turns::new(at, orders + 2));
+                let window = ImmersionWindow::new(stretch.immersion, orders);
                 for n in 0..=orders {
                     let turn = helix[n] * ahead.at(n as i64);
-                    let integral = Integrals::over(stretch.immersion, &ends, n);
+                    let integral = window.integrals(n);
                     let cutting: [Complex64; 3] = std::array::from_fn(|d| {
                         turn * (integral.by_sine[d] * stretch.slope_mm
                             + integral.plain[d] * stretch.offset_mm)
@@ -94,7 +94,7 @@ impl MillingCut {
                     let mut grows = [[Complex64::ZERO; 3]; 2];
                     let free = [start_rad, exit_rad]
                         .into_iter()
-                        .zip(&ends)
+                        .zip(&window.ends)
                         .zip(stretch.from_nothing);
                     for ((at, end), is_free) in free {
                         let rise = (stretch.slope_mm * at.cos()).abs();
@@ -197,48 +197,6 @@ impl MillingCut {
             ];
         }
         all
-    }
-}
-
-/// (1/2π) ∫ {cos φ, sin φ, 1} e^{−inφ} dφ over a stretch, as it is and with sin φ besides.
-struct Integrals {
-    plain: [Complex64; 3],
-    by_sine: [Complex64; 3],
-}
-
-/// e^{−inφ} of one angle, for all orders.
-struct Turns(Vec<Complex64>);
-
-impl Turns {
-    fn new(angle_rad: f64, orders: usize) -> Turns {
-        let one = Complex64::from_polar(1.0, -angle_rad);
-        let powers = std::iter::successors(Some(Complex64::ONE), |at| Some(at * one));
-        Turns(powers.take(orders + 1).collect())
-    }
-
-    /// `order` may be negative.
-    fn at(&self, order: i64) -> Complex64 {
-        let turn = self.0[order.unsigned_abs() as usize];
-        if order < 0 { turn.conj() } else { turn }
-    }
-}
-
-impl Integrals {
-    /// `ends`: the turns of the angles that the stretch begins and ends at.
-    fn over(Immersion { start_rad, exit_rad }: Immersion, ends: &[Turns; 2], n: usize) -> Integrals {
-        let i = Complex64::I;
-        let w = [-2i64, -1, 0, 1, 2].map(|m| match n as i64 + m {
-            0 => Complex64::from((exit_rad - start_rad) / TAU),
-            order => (ends[1].at(order) - ends[0].at(order)) * (i / (TAU * order as f64)),
-        });
-        let cos = 0.5 * (w[1] + w[3]);
-        let sin = (w[1] - w[3]) / (2.0 * i);
-        let sin_cos = (w[0] - w[4]) / (4.0 * i);
-        let sin_sin = 0.5 * w[2] - 0.25 * (w[0] + w[4]);
-        Integrals {
-            plain: [cos, sin, w[2]],
-            by_sine: [sin_cos, sin_sin, sin],
-        }
     }
 }
 

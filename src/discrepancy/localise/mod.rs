@@ -18,7 +18,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::Result;
 use crate::effects::drawn::{self, DrawnForm};
-use crate::effects::{Instance, Spot, Structure};
+use crate::effects::{Instance, Site, Spot, Structure};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, estimates};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
@@ -102,7 +102,7 @@ pub struct BestForm {
     pub p_value: f64,
     /// One of its parameters stopped at the end of its range.
     pub at_bound: bool,
-    /// On postures left out of the fit.
+    /// On postures left out of the fit; of the best place and of those that are tied with it.
     pub held_out: Option<HeldOut>,
 }
 
@@ -114,7 +114,10 @@ impl BestForm {
 
     /// `a resonator on link 5 along z`; `of_part` stands behind each form.
     pub fn in_words(&self, of_part: impl Fn(&DrawnPart) -> String) -> String {
-        let part = |p: &DrawnPart| format!("{}{} {}", p.form().words(), of_part(p), p.spot.words());
+        let part = |p: &DrawnPart| {
+            let place = p.form().place_in_words(p.spot);
+            format!("{}{} {place}", p.form().words(), of_part(p))
+        };
         self.parts().map(part).collect::<Vec<_>>().join(", and ")
     }
 }
@@ -155,11 +158,14 @@ impl Localisation {
 const FITTED: usize = 10;
 /// … and such as promise most at each other starting point.
 const FITTED_ELSEWHERE: usize = 5;
+/// Forms of all places, and of a second displacement, that are followed beyond their first steps.
+const FOLLOWED: usize = 24;
+const SECOND_FOLLOWED: usize = 6;
 /// Places whose curves leave the same to so many parts are one place to these data.
 const SAME_LEFT: f64 = 1e-6;
 /// Places at which a second displacement is tried, and displacements that are tried there.
 const SECOND: [usize; 2] = [4, 2];
-/// Squares per value of the model as it stands from which on two displacements may have something to explain …
+/// Squares per value that the best place leaves from which on two displacements may have something to explain …
 const SECOND_FROM: f64 = 1.02;
 /// … and from which on more than noise is left.
 const LEFT_OVER: f64 = 1.1;
@@ -204,9 +210,9 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let values = study.real_values(Extent::Coarse) as f64;
     let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
     let ties = ties(&screened);
-    let mut chosen: Vec<(usize, &Screened, Starts)> = leaders(&screened, &ties, FITTED)
+    let mut chosen: Vec<(usize, Sought)> = leaders(&screened, &ties, FITTED)
         .into_iter()
-        .map(|i| (i, &screened[i], starts.clone()))
+        .map(|i| (i, Sought::new(&screened[i], starts.clone())))
         .collect();
     // Where the model is far off, what is linear there says little: the nominal values may be nearer.
     let elsewhere: Vec<Vec<Screened>> = starts
@@ -220,16 +226,29 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             let Some(place) = place.map(|i| ties[i]) else {
                 continue;
             };
-            if chosen.iter().all(|(known, ..)| *known != place) {
-                chosen.push((place, &there[s], starts.beginning_at(k)));
+            if chosen.iter().all(|(known, _)| *known != place) {
+                chosen.push((place, Sought::new(&there[s], starts.beginning_at(k))));
             }
         }
     }
+    // A support that gives way leads the model far away, and what is linear there says least of it.
+    let supports = screened.iter().enumerate().filter(|(i, s)| {
+        let is_known = chosen.iter().any(|(known, _)| known == i);
+        ties[*i] == *i && s.spot.is_series() && !is_known && !starts.elsewhere.is_empty()
+    });
+    let supports: Vec<(usize, Sought)> = supports
+        .filter_map(|(i, support)| {
+            let mut sought = Sought::new(support, starts.clone());
+            sought.forms = vec![support_form(support.spot)?];
+            Some((i, sought))
+        })
+        .collect();
+    chosen.extend(supports);
     let looked: Vec<(usize, Looked<Structure>)> = chosen
         .par_iter()
-        .flat_map_iter(|(i, screened, starts)| {
-            let forms = look_at_forms(study, model, starts, screened);
-            forms.into_iter().map(|form| (*i, form))
+        .flat_map_iter(|(place, sought)| {
+            let forms = sought.look(study, model);
+            forms.into_iter().map(|form| (*place, form))
         })
         .collect();
     let base_count = model.parameters.len();
@@ -238,44 +257,78 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     };
     let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
     let (own, looked): (Vec<usize>, Vec<Looked<Structure>>) = looked.into_iter().unzip();
+    let place_of = |spot: Spot| screened.iter().position(|s| s.spot == spot).map(|i| ties[i]);
     let mut by_place: BTreeMap<usize, Vec<Tried<Structure>>> = BTreeMap::new();
-    for (place, tried) in own.into_iter().zip(race(study, looked)) {
-        by_place.entry(place).or_default().extend(tried);
+    for (place, tried) in own.into_iter().zip(race(study, looked, FOLLOWED)) {
+        let Some(tried) = tried else { continue };
+        let renamed = along_its_axis(study, model, &tried);
+        let (place, tried) = renamed
+            .and_then(|(spot, renamed)| Some((place_of(spot)?, renamed)))
+            .unwrap_or((place, tried));
+        by_place.entry(place).or_default().push(tried);
     }
     let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = by_place
         .into_iter()
-        .filter(|(_, forms)| !forms.is_empty())
         .map(|(i, mut forms)| {
             forms.sort_by(better);
+            // Found from another axis of its place as well.
+            let mut known = Vec::new();
+            forms.retain(|t| {
+                let is_new = !known.contains(&t.instance.variant);
+                known.push(t.instance.variant);
+                is_new
+            });
             (i, forms)
         })
         .collect();
     fitted.sort_by(|a, b| bic(&a.1[0]).total_cmp(&bic(&b.1[0])));
     let tests: usize =
         fitted.iter().map(|(_, forms)| forms.len()).sum::<usize>().max(1) * spots.len() / chosen.len().max(1);
-    let pairs: Vec<Option<Pair>> = fitted
+    let least = fitted
+        .first()
+        .map_or(f64::INFINITY, |(_, forms)| forms[0].fit.cost);
+    let is_enough = 2.0 * least <= SECOND_FROM * values;
+    let second: Vec<Option<Second>> = fitted
         .par_iter()
         .enumerate()
         .map(|(rank, (i, forms))| {
-            if rank >= SECOND[0] || 2.0 * coarse_base.cost <= SECOND_FROM * values {
+            if rank >= SECOND[0] || is_enough {
                 return None;
             }
-            let pair = second_form(
-                study,
-                &thinned,
-                forms,
-                screened[*i].spot,
-                base_count,
-                &starts.elsewhere,
-            )?;
-            better(&pair.tried, &forms[0]).is_lt().then_some(pair)
+            let spot = screened[*i].spot;
+            let second = second_form(study, (model, &thinned), forms, spot, &starts.elsewhere)?;
+            better(second.tried(), &forms[0]).is_lt().then_some(second)
         })
         .collect();
     let mut fitted: Vec<Fitted> = fitted
         .into_iter()
-        .zip(pairs)
-        .map(|((place, forms), pair)| Fitted { place, forms, pair })
+        .map(|(place, forms)| Fitted {
+            place,
+            forms,
+            pair: None,
+        })
         .collect();
+    for (k, second) in second.into_iter().enumerate() {
+        match second {
+            Some(Second::Beside(pair)) => fitted[k].pair = Some(pair),
+            Some(Second::Instead(spot, tried)) => {
+                let Some(place) = place_of(spot) else { continue };
+                match fitted.iter_mut().find(|f| f.place == place) {
+                    Some(known) => {
+                        known.forms.retain(|t| t.instance != tried.instance);
+                        known.forms.push(tried);
+                        known.forms.sort_by(better);
+                    }
+                    None => fitted.push(Fitted {
+                        place,
+                        forms: vec![tried],
+                        pair: None,
+                    }),
+                }
+            }
+            None => (),
+        }
+    }
     fitted.sort_by(|a, b| bic(a.best()).total_cmp(&bic(b.best())));
 
     let without = Without {
@@ -309,6 +362,14 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             settled[i].tied_with = others.map(|(_, other)| other.spot.label()).collect();
         }
     }
+    let without_folds = |model: &StructureModel, theta: &[f64]| {
+        held_out(study, model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)
+    };
+    let in_question = settled.iter_mut().enumerate();
+    let in_question = in_question.filter(|(i, place)| *i == 0 || !place.tied_with.is_empty());
+    for best in in_question.filter_map(|(_, place)| place.best.as_mut()) {
+        best.held_out = without_folds(&best.model, &best.theta)?;
+    }
     let others = fitted.iter().skip(SETTLED);
     let fitted_only = others.map(|f| place(&screened[f.place], &f.forms, &bic, None));
     let mut places = settled.clone();
@@ -328,7 +389,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         let tied = screened.iter().enumerate().filter(same);
         place.tied_with.extend(tied.map(|(_, s)| s.spot.label()));
     }
-    let baseline_held_out = held_out(study, model, theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?;
+    let baseline_held_out = without_folds(model, theta)?;
     let significant = settled.first().and_then(|p| p.best.as_ref()).is_some_and(|best| {
         let predicts = match (&best.held_out, &baseline_held_out) {
             (Some(with), Some(without)) => with.chi2 < without.chi2,
@@ -410,6 +471,90 @@ fn place(
     }
 }
 
+/// What is tried wherever a support may give way: along the axis of a bearing, or alike both ways across it. `None` for what turns with
+/// a joint, and where one way across is the other's.
+fn support_form(spot: Spot) -> Option<DrawnForm> {
+    match spot {
+        Spot::Base(2) | Spot::Bearing(_, 2) => Some(DrawnForm::Spring),
+        _ => spot.alike().map(|_| DrawnForm::IsotropicSpring),
+    }
+}
+
+/// The forms that are sought at a place.
+struct Sought<'a> {
+    /// What was seen there, from where the fits begin.
+    screened: &'a Screened,
+    starts: Starts,
+    forms: Vec<DrawnForm>,
+}
+
+impl<'a> Sought<'a> {
+    /// All that it can have.
+    fn new(screened: &'a Screened, starts: Starts) -> Self {
+        Sought {
+            screened,
+            forms: drawn::forms(screened.spot),
+            starts,
+        }
+    }
+
+    /// The first steps of the fit of each form, started from the drawn curve.
+    fn look(&self, study: &StructureStudy, model: &StructureModel) -> Vec<Looked<Structure>> {
+        let (from, screened) = (&self.starts, self.screened);
+        let bounds = model.bounds();
+        let moved: Vec<f64> = from
+            .theta
+            .iter()
+            .zip(&screened.step)
+            .zip(&bounds)
+            .map(|((t, d), b)| (t + d.clamp(-1.0, 1.0)).clamp(b[0], b[1]))
+            .collect();
+        let mut bases = vec![from.theta.clone(), moved];
+        bases.extend(from.elsewhere.iter().cloned());
+        let effort = match from.elsewhere.is_empty() {
+            true => Effort::Direct,
+            false => Effort::StagedAtAGlance,
+        };
+        self.forms
+            .par_iter()
+            .filter_map(|&form| {
+                let instance = drawn::instance(screened.spot, form);
+                let extended = study.extend(model, &instance);
+                let own = &extended.parameters[model.parameters.len()..];
+                let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
+                let alike = from
+                    .stiffness
+                    .filter(|_| !screened.spot.is_angle())
+                    .and_then(|k| match form {
+                        DrawnForm::Spring => Some(vec![k]),
+                        DrawnForm::SpringDamper => Some(vec![k, 1e-3 * k]),
+                        DrawnForm::LossFactor => Some(vec![k, 0.05]),
+                        _ => None,
+                    });
+                let usual = own.iter().map(|p| p.nominal).collect();
+                let starts: Vec<Vec<f64>> = starting_values(form, screened)
+                    .into_iter()
+                    .chain(alike)
+                    .chain([usual])
+                    .chain(proposed.into_iter().take(4))
+                    .map(|start| {
+                        own.iter()
+                            .zip(start)
+                            .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
+                            .collect()
+                    })
+                    .collect();
+                let fits = look(study, &extended, &bases, &starts, effort).ok()?;
+                Some(Looked {
+                    instance,
+                    model: extended,
+                    fits,
+                })
+            })
+            .collect()
+    }
+}
+
 /// What was fitted at a place.
 struct Fitted {
     /// Index of the screened place.
@@ -434,6 +579,23 @@ struct Pair {
     second: Spot,
     /// The second, with the first in the model.
     tried: Tried<Structure>,
+}
+
+/// What a second displacement of a place gives.
+enum Second {
+    /// Both are needed.
+    Beside(Pair),
+    /// It explains as much without the first.
+    Instead(Spot, Tried<Structure>),
+}
+
+impl Second {
+    fn tried(&self) -> &Tried<Structure> {
+        match self {
+            Second::Beside(pair) => &pair.tried,
+            Second::Instead(_, tried) => tried,
+        }
+    }
 }
 
 /// From where the model's parameters are fitted.
@@ -487,21 +649,23 @@ fn by_bound_then_bic(
 }
 
 /// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model;
-/// fitted from `elsewhere`, too, points of the model without either.
+/// fitted from `elsewhere`, too, points of the model without either. `bare`: that model, and thinned data.
 fn second_form(
     study: &StructureStudy,
-    thinned: &FrfData,
+    (bare, thinned): (&StructureModel, &FrfData),
     forms: &[Tried<Structure>],
     spot: Spot,
-    base_count: usize,
     elsewhere: &[Vec<f64>],
-) -> Option<Pair> {
+) -> Option<Second> {
+    let base_count = bare.parameters.len();
     // Two resonators at one displacement may have stood for one at each of two.
     let law = |t: &Tried<Structure>| drawn::form_of(t.instance.variant);
     let first = match law(&forms[0]) {
         // It has its direction in all three already.
         DrawnForm::ObliqueSpringDamper => return None,
         DrawnForm::TwoResonators => forms.iter().find(|t| law(t) == DrawnForm::Resonator)?,
+        // Its stiffness along the second axis may be another one.
+        form if form.is_isotropic() => forms.iter().find(|t| !law(t).is_isotropic())?,
         _ => &forms[0],
     };
     let (model, theta) = (&first.model, &first.fit.theta);
@@ -518,13 +682,15 @@ fn second_form(
         stiffness: first_stiffness(first, base_count),
     };
     let looked = promising.iter().take(SECOND[1]).flat_map(|second| {
-        let forms = look_at_forms(study, model, &starts, second);
+        let mut sought = Sought::new(second, starts.clone());
+        sought.forms.retain(|form| !form.is_isotropic());
+        let forms = sought.look(study, model);
         forms.into_iter().map(|form| (second.spot, form))
     });
     let (spots, looked): (Vec<Spot>, Vec<Looked<Structure>>) = looked.unzip();
     let pairs = spots
         .into_iter()
-        .zip(race(study, looked))
+        .zip(race(study, looked, SECOND_FOLLOWED))
         .filter_map(|(second, tried)| {
             Some(Pair {
                 first: first.instance,
@@ -534,7 +700,24 @@ fn second_form(
             })
         });
     let values = study.real_values(Extent::Coarse) as f64;
-    pairs.min_by(|a, b| by_bound_then_bic(&a.tried, &b.tried, base_count, values))
+    let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
+    let pair = pairs.min_by(|a, b| better(&a.tried, &b.tried))?;
+    let alone = without_the_first(study, bare, &pair);
+    Some(match alone.filter(|alone| better(alone, &pair.tried).is_lt()) {
+        Some(alone) => Second::Instead(pair.second, alone),
+        None => Second::Beside(pair),
+    })
+}
+
+/// The second form of a pair alone, from where it stands beside the first.
+fn without_the_first(study: &StructureStudy, bare: &StructureModel, pair: &Pair) -> Option<Tried<Structure>> {
+    let instance = pair.tried.instance;
+    let model = study.extend(bare, &instance);
+    let both = &pair.tried.fit.theta;
+    let start = [&both[..bare.parameters.len()], &both[pair.first_count..]].concat();
+    let problem = study.problem(&model, View::COARSE);
+    let fit = minimise(&problem, &start, &model.bounds(), REFINE).ok()?;
+    Some(Tried { instance, model, fit })
 }
 
 /// The stiffness of a form that is a spring or has one, N/m.
@@ -544,62 +727,35 @@ fn first_stiffness(first: &Tried<Structure>, base_count: usize) -> Option<f64> {
     is_stiffness.then(|| parameter.natural(first.fit.theta[base_count]))
 }
 
-/// The first steps of the fit of each form of a place, started from the drawn curve.
-fn look_at_forms(
+/// A fitted form whose direction mostly follows another axis than the one it was started along, named after that.
+fn along_its_axis(
     study: &StructureStudy,
     model: &StructureModel,
-    from: &Starts,
-    screened: &Screened,
-) -> Vec<Looked<Structure>> {
-    let bounds = model.bounds();
-    let moved: Vec<f64> = from
-        .theta
-        .iter()
-        .zip(&screened.step)
-        .zip(&bounds)
-        .map(|((t, d), b)| (t + d.clamp(-1.0, 1.0)).clamp(b[0], b[1]))
-        .collect();
-    let mut bases = vec![from.theta.clone(), moved];
-    bases.extend(from.elsewhere.iter().cloned());
-    let effort = match from.elsewhere.is_empty() {
-        true => Effort::Direct,
-        false => Effort::Staged,
+    tried: &Tried<Structure>,
+) -> Option<(Spot, Tried<Structure>)> {
+    let Site::At(spot) = tried.instance.site else {
+        return None;
     };
-    drawn::forms(screened.spot)
-        .into_par_iter()
-        .filter_map(|form| {
-            let instance = drawn::instance(screened.spot, form);
-            let extended = study.extend(model, &instance);
-            let own = &extended.parameters[model.parameters.len()..];
-            let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
-            let alike = from
-                .stiffness
-                .filter(|_| !screened.spot.is_angle())
-                .and_then(|k| match form {
-                    DrawnForm::Spring => Some(vec![k]),
-                    DrawnForm::SpringDamper => Some(vec![k, 1e-3 * k]),
-                    DrawnForm::LossFactor => Some(vec![k, 0.05]),
-                    _ => None,
-                });
-            let starts: Vec<Vec<f64>> = starting_values(form, screened)
-                .into_iter()
-                .chain(alike)
-                .chain(proposed.into_iter().take(4))
-                .map(|start| {
-                    own.iter()
-                        .zip(start)
-                        .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
-                        .collect()
-                })
-                .collect();
-            let fits = look(study, &extended, &bases, &starts, effort).ok()?;
-            Some(Looked {
-                instance,
-                model: extended,
-                fits,
-            })
-        })
-        .collect()
+    let count = model.parameters.len();
+    let (front, own) = tried.fit.theta.split_at(count);
+    let own = tried.model.parameters[count..].iter().zip(own);
+    let own: Vec<f64> = own.map(|(p, t)| p.natural(*t)).collect();
+    let form = drawn::form_of(tried.instance.variant);
+    let (spot, values) = drawn::along_its_axis(spot, form, &own)?;
+    let instance = drawn::instance(spot, form);
+    let model = study.extend(model, &instance);
+    let own = model.parameters[count..].iter().zip(values);
+    let own = own.map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
+    let start: Vec<f64> = front.iter().copied().chain(own).collect();
+    let fit = minimise(
+        &study.problem(&model, View::COARSE),
+        &start,
+        &model.bounds(),
+        REFINE,
+    )
+    .ok()?;
+    let renamed = Tried { instance, model, fit };
+    Some((spot, renamed))
 }
 
 /// Starting values of a form from the drawn curve, natural units in the order of its parameters.
@@ -626,9 +782,9 @@ fn starting_values(form: DrawnForm, screened: &Screened) -> Vec<Vec<f64>> {
     let rotor = (inertia * weight + square * re) / (weight * fourth - square * square);
     let stiff = (re + rotor * square) / weight;
     match form {
-        DrawnForm::Spring => vec![vec![spring]],
+        DrawnForm::Spring | DrawnForm::IsotropicSpring => vec![vec![spring]],
         DrawnForm::Damper => vec![vec![damper]],
-        DrawnForm::SpringDamper => vec![vec![spring, damper]],
+        DrawnForm::SpringDamper | DrawnForm::IsotropicSpringDamper => vec![vec![spring, damper]],
         DrawnForm::Mass => vec![vec![mass]],
         DrawnForm::LossFactor if matches!(screened.spot, Spot::Joint(_)) => vec![vec![loss]],
         DrawnForm::LossFactor => vec![vec![spring, (loss / spring).abs()]],
@@ -685,7 +841,7 @@ fn settled_form(study: &StructureStudy, spot: Spot, fitted: &Fitted, without: &W
     settle(study, spot, (tried, pair), fit, without)
 }
 
-/// A form at `spot`, or two at its place, at the `fit` to all data: judged, and tested on postures left out.
+/// A form at `spot`, or two at its place, at the `fit` to all data: judged.
 fn settle(
     study: &StructureStudy,
     spot: Spot,
@@ -722,7 +878,7 @@ fn settle(
         delta_bic: extra * (share * values).ln() - gain,
         p_value: (single * without.tests as f64).min(1.0),
         at_bound: at_bound(&fit, base_count),
-        held_out: held_out(study, model, &fit.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
+        held_out: None,
         theta: fit.theta,
         model: model.clone(),
     })

@@ -34,16 +34,29 @@ pub fn named(
     let without = study.problem(model, View::GLANCE).cost(&found.baseline.theta)?;
     let drawn = study.problem(&best.model, View::GLANCE).cost(&best.theta)?;
     let instances = study.instances(model).0;
+    let hints = study.hints(model, &found.baseline.theta)?;
     let fits = instances.par_iter().filter_map(|instance| {
         let extended = study.extend(model, instance);
-        let own = extended.parameters[count..].iter().map(|p| {
-            let mut drawn = best.parts().flat_map(|part| &part.parameters);
-            // `branch@link-3.x.mass_kg`
-            let drawn = drawn.find(|d| d.name.rsplit('.').next() == p.name.rsplit('.').next());
-            p.internal(drawn.map_or(p.nominal, |d| d.value.clamp(p.bounds[0], p.bounds[1])))
-        });
-        let start: Vec<f64> = best.theta[..count].iter().copied().chain(own).collect();
+        let own = &extended.parameters[count..];
+        let known = study.known(&extended);
+        let proposed = instance.effect.starts(instance.at(), &known, &hints);
+        let nominal: Vec<f64> = own.iter().map(|p| p.nominal).collect();
         let problem = study.problem(&extended, View::GLANCE);
+        let start = std::iter::once(nominal)
+            .chain(proposed)
+            .map(|values| {
+                let own = own.iter().zip(values).map(|(p, value)| {
+                    let mut drawn = best.parts().flat_map(|part| &part.parameters);
+                    // `branch@link-3.x.mass_kg`
+                    let drawn = drawn.find(|d| d.name.rsplit('.').next() == p.name.rsplit('.').next());
+                    let value = drawn.map_or(value, |d| d.value);
+                    p.internal(value.clamp(p.bounds[0], p.bounds[1]))
+                });
+                best.theta[..count].iter().copied().chain(own).collect()
+            })
+            .map(|start: Vec<f64>| (problem.cost(&start).unwrap_or(f64::INFINITY), start))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?
+            .1;
         let fit = minimise(&problem, &start, &extended.bounds(), FEW_STEPS).ok()?;
         Some((fit.cost, *instance, fit.theta))
     });

@@ -244,6 +244,26 @@ fn a_hose_is_a_spring_to_the_ground_along_a_direction_of_its_own() {
     assert!((stiffness.value / truth[0] - 1.0).abs() < 0.15, "{stiffness:?}");
 }
 
+/// A foot plate that slides both ways, so soft that it leads the joints far away: along either axis alone it explains little.
+#[test]
+fn a_base_that_slides_both_ways_is_found_and_weighed() {
+    let found = found(Some((Spot::Base(0), DrawnForm::IsotropicSpring, &[3e6])), 16);
+    let place = &found.places[0];
+    assert!(
+        found.significant && first_or_tied(&found, Spot::Base(0)) && place.left < 1.1,
+        "{:?} {}",
+        place.spot,
+        place.left
+    );
+    let best = place.best.as_ref().unwrap();
+    let stiffness = &best.first.parameters[0];
+    assert!((stiffness.value / 3e6 - 1.0).abs() < 0.05, "{stiffness:?}");
+    assert!(
+        best.in_words(|_| String::new())
+            .starts_with("an isotropic spring")
+    );
+}
+
 #[test]
 fn nothing_is_drawn_where_nothing_is_missing() {
     for seed in [21, 22] {

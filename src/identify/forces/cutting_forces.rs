@@ -1,5 +1,7 @@
 //! Forces on the recorded channels, with derivatives: from the chip through frame, sensor and crosstalk.
 
+use std::borrow::Cow;
+
 use num_complex::Complex64;
 
 use crate::cutting::waveform::{
@@ -218,35 +220,33 @@ fn chip_forces(
         }
         return forces;
     }
-    if is_linear {
-        match unit {
-            Some(unit) => add_units(&mut forces, unit, physics, dyno_from_tool),
-            None => add_units(&mut forces, &milling.linear(cut.orders), physics, dyno_from_tool),
-        }
-        // Fall through: own teeth of several helix angles have their derivatives from differences, below.
-    } else {
-        let sampled = milling.sampled(cut.orders, chip_law(physics), parameters > 0);
-        add_units(&mut forces, &sampled.unit, physics, dyno_from_tool);
-        let own = [
-            physics.size_exponent.as_ref(),
-            physics.runout.as_ref().map(|r| &r.offset_mm),
-            physics.runout.as_ref().map(|r| &r.angle_rad),
-        ];
-        for (slope, by) in sampled.slopes.iter().zip(own) {
-            if let (Some(slope), Some(by)) = (slope, by) {
-                add_slopes(&mut forces, slope, by, physics, dyno_from_tool);
-            }
+    let law = chip_law(physics);
+    let sampled = (!is_linear).then(|| milling.sampled(cut.orders, law, parameters > 0));
+    let unmoved = match (&sampled, unit) {
+        (Some(sampled), _) => Cow::Borrowed(&sampled.unit),
+        (None, Some(unit)) => Cow::Borrowed(unit),
+        (None, None) => Cow::Owned(milling.linear(cut.orders)),
+    };
+    add_units(&mut forces, &unmoved, physics, dyno_from_tool);
+    let of_the_law = [
+        physics.size_exponent.as_ref(),
+        physics.runout.as_ref().map(|r| &r.offset_mm),
+        physics.runout.as_ref().map(|r| &r.angle_rad),
+    ];
+    let slopes = sampled.iter().flat_map(|s| &s.slopes);
+    for (slope, by) in slopes.zip(of_the_law) {
+        if let (Some(slope), Some(by)) = (slope, by) {
+            add_slopes(&mut forces, slope, by, physics, dyno_from_tool);
         }
     }
-    // Together with another law of the chip there is no closed form: differences, mm or rad.
+    // Own teeth together with another law of the chip, or of several helix angles, have no closed form: differences, mm or rad.
     const STEP: f64 = 1e-7;
-    let unmoved = own.map(|_| milling.sampled(cut.orders, chip_law(physics), false).unit);
     let tooth_slope = |change: &dyn Fn(&mut ToothPlace), index: usize| {
         let mut moved = milling.clone();
         change(&mut moved.places[index]);
-        let mut slope = moved.sampled(cut.orders, chip_law(physics), false).unit;
+        let mut slope = moved.sampled(cut.orders, law, false).unit;
         let values = slope.iter_mut().flatten().flatten();
-        let from = unmoved.iter().flatten().flatten().flatten();
+        let from = unmoved.iter().flatten().flatten();
         values
             .zip(from)
             .for_each(|(value, from)| *value = (*value - from) / STEP);

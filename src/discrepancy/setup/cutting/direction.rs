@@ -3,10 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::plausible::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, coefficient, fit, improbability};
-use crate::cutting::USUAL;
+use super::plausible::{FittedReading, MUCH_BETTER, SUSPICIOUS};
 use crate::discrepancy::setup::SetupFinding;
-use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, cutting_nrms};
 use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
 
 /// One more cut is taken to be milled the other way where that leaves this part of the misfit.
@@ -19,38 +17,34 @@ struct Mirrored {
     /// By index into the data's cuts.
     cuts: Vec<usize>,
     data: CuttingData,
-    fit: Calibration,
+    fitted: FittedReading,
 }
 
 impl Mirrored {
     fn new(data: &CuttingData, cuts: Vec<usize>) -> Option<Mirrored> {
         let data = data.milled_the_other_way(|i| cuts.contains(&i));
-        let fit = fit(&data)?;
-        Some(Mirrored { cuts, data, fit })
-    }
-
-    fn is_plausible(&self) -> Option<bool> {
-        let [low, high] = USUAL;
-        let model = CuttingModel::new(&self.data, true).ok()?;
-        let nrms = cutting_nrms(&model, &self.data, &self.fit.theta).ok()?;
-        let ktc = coefficient(&self.fit, "ktc_n_per_mm2");
-        Some(improbability(&self.fit) < IMPLAUSIBLE && (low..high).contains(&ktc) && nrms < EXPLAINS_NRMS)
+        let fitted = FittedReading::of(&data)?;
+        Some(Mirrored { cuts, data, fitted })
     }
 }
 
-/// Cuts that were milled the other way, where the waveforms say so; with the misfit that is left then.
-pub(super) fn milling_direction(data: &CuttingData) -> Option<(SetupFinding, f64)> {
+/// Cuts that were milled the other way, where the waveforms say so; with the misfit that is left then. `now`: the records as the
+/// campaign has them, fitted.
+pub(super) fn milling_direction(
+    data: &CuttingData,
+    now: Option<&Calibration>,
+) -> Option<(SetupFinding, f64)> {
     let one_sided: Vec<usize> = (0..data.cuts.len())
         .filter(|i| data.cuts[*i].is_one_sided())
         .collect();
     if one_sided.is_empty() {
         return None;
     }
-    let now = fit(data).filter(|now| now.reduced_chi2 >= SUSPICIOUS)?;
-    let is_much_better = |m: &Mirrored| m.fit.reduced_chi2 < MUCH_BETTER * now.reduced_chi2;
+    let now = now.filter(|now| now.reduced_chi2 >= SUSPICIOUS)?;
+    let is_much_better = |m: &Mirrored| m.fitted.chi2() < MUCH_BETTER * now.reduced_chi2;
     let all = Mirrored::new(data, one_sided.clone()).filter(is_much_better);
-    let found = all.or_else(|| cut_by_cut(data, &one_sided, &now).filter(is_much_better));
-    let found = found.filter(|m| m.is_plausible() == Some(true))?;
+    let found = all.or_else(|| cut_by_cut(data, &one_sided, now).filter(is_much_better));
+    let found = found.filter(|m| m.fitted.is_plausible())?;
     let of_cut = |i: &usize| {
         let cut = &found.data.cuts[*i];
         let [start, exit] = cut.immersion_deg().unwrap_or_default();
@@ -67,9 +61,6 @@ pub(super) fn milling_direction(data: &CuttingData) -> Option<(SetupFinding, f64
         true => "all cuts".to_string(),
         false => format!("cut {}", ids.join(", ")),
     };
-    let [ktc, krc, kac] =
-        ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"].map(|n| coefficient(&found.fit, n));
-    let left = found.fit.reduced_chi2;
     let finding = SetupFinding {
         kind: "milling-direction",
         place: which,
@@ -78,14 +69,13 @@ pub(super) fn milling_direction(data: &CuttingData) -> Option<(SetupFinding, f64
         unit: "",
         confidence: 0.97,
         remedy: format!(
-            "Up and down milling look exchanged: write the immersion angles the other way round ({}{more}). Read so, the waveforms \
-             leave {left:.2} times the variance of the noise (as it is {:.2}) and Ktc, Krc, Kac are {ktc:.0}, {krc:.0}, {kac:.0} \
-             N/mm². The coefficients with the present angles are wrong.",
+            "Up and down milling look exchanged: write the immersion angles the other way round ({}{more}). Read so, {}. The \
+             coefficients with the present angles are wrong.",
             angles.join("; "),
-            now.reduced_chi2,
+            found.fitted.in_words(now.reduced_chi2),
         ),
     };
-    Some((finding, left))
+    Some((finding, found.fitted.chi2()))
 }
 
 /// Cut after cut turned round as long as that helps, of the worst ones the best first; at most half of them.
@@ -93,7 +83,7 @@ fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: &Calibration) -> Opt
     let mut best: Option<Mirrored> = None;
     for _ in 0..one_sided.len() / 2 {
         let (so_far, left, theta) = match &best {
-            Some(m) => (m.cuts.clone(), m.fit.reduced_chi2, &m.fit.theta),
+            Some(m) => (m.cuts.clone(), m.fitted.chi2(), &m.fitted.calibration.theta),
             None => (Vec::new(), now.reduced_chi2, &now.theta),
         };
         let read = best.as_ref().map_or(data, |m| &m.data);
@@ -115,8 +105,8 @@ fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: &Calibration) -> Opt
         let next = worst
             .into_par_iter()
             .filter_map(|i| Mirrored::new(data, [so_far.as_slice(), &[i]].concat()))
-            .min_by(|a, b| a.fit.reduced_chi2.total_cmp(&b.fit.reduced_chi2))?;
-        if next.fit.reduced_chi2 > CUT_BY_CUT * left {
+            .min_by(|a, b| a.fitted.chi2().total_cmp(&b.fitted.chi2()))?;
+        if next.fitted.chi2() > CUT_BY_CUT * left {
             break;
         }
         best = Some(next);

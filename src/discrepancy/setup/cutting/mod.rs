@@ -17,14 +17,11 @@ use super::examine::SetupCheck;
 use super::finding::{SetupFinding, with_error};
 use super::readings::Turn;
 use crate::Result;
-use crate::cutting::USUAL;
 use crate::data::Process;
-use crate::identify::forces::cutting_study::{
-    EXPLAINS_NRMS, NOISE_KNOWN_TO, calibrate_cutting, cutting_nrms, small_errors,
-};
+use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{CuttingData, CuttingModel};
 use direction::milling_direction;
-use plausible::{IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, coefficient, fit, improbability};
+use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability};
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
@@ -53,7 +50,9 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         return Ok(check);
     }
     // The waveform is cut from the other side, or seen from one: what leaves less is told.
-    let found = [milling_direction(data), dyno_axes(data)?];
+    let model = CuttingModel::new(data, true);
+    let base = model.and_then(|model| calibrate_cutting(&model, data));
+    let found = [milling_direction(data, base.as_ref().ok()), dyno_axes(data)?];
     let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((finding, left)) = least {
         check.explained_share = 1.0;
@@ -61,8 +60,7 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         check.findings.push(finding);
         return Ok(check);
     }
-    let model = CuttingModel::new(data, true)?;
-    let base = calibrate_cutting(&model, data)?;
+    let base = base?;
     check.reduced_chi2 = base.reduced_chi2;
     if base.reduced_chi2 < SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64) {
         return Ok(check);
@@ -100,16 +98,6 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     Ok(check)
 }
 
-/// A fit of one reading.
-struct Trial {
-    turn: Turn,
-    chi2: f64,
-    /// Error over the signal.
-    nrms: f64,
-    improbability: f64,
-    cutting: [f64; 3],
-}
-
 fn read(data: &CuttingData, turn: Turn) -> CuttingData {
     let mut own = data.clone();
     for i in 0..3 {
@@ -131,44 +119,29 @@ fn dyno_axes(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
     if now.reduced_chi2 < SUSPICIOUS && now_improbable < IMPLAUSIBLE {
         return Ok(None);
     }
-    let trials: Vec<Trial> = Turn::all()
+    let trials: Vec<(Turn, FittedReading)> = Turn::all()
         .into_par_iter()
         .filter(|turn| *turn != Turn::NONE)
-        .filter_map(|turn| {
-            let own = read(&some, turn);
-            let calibration = fit(&own)?;
-            let model = CuttingModel::new(&own, true).ok()?;
-            Some(Trial {
-                turn,
-                chi2: calibration.reduced_chi2,
-                nrms: cutting_nrms(&model, &own, &calibration.theta).ok()?,
-                improbability: improbability(&calibration),
-                cutting: ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"]
-                    .map(|n| coefficient(&calibration, n)),
-            })
-        })
+        .filter_map(|turn| Some((turn, FittedReading::of(&read(&some, turn))?)))
         .collect();
-    let least = trials.iter().map(|t| t.chi2).fold(now.reduced_chi2, f64::min);
-    let mut equal: Vec<&Trial> = trials.iter().filter(|t| t.chi2 <= ALIKE * least).collect();
-    equal.sort_by(|a, b| a.improbability.total_cmp(&b.improbability));
-    let Some(best) = equal.first() else {
+    let least = trials.iter().map(|t| t.1.chi2()).fold(now.reduced_chi2, f64::min);
+    let mut equal: Vec<&(Turn, FittedReading)> =
+        trials.iter().filter(|t| t.1.chi2() <= ALIKE * least).collect();
+    equal.sort_by(|a, b| a.1.improbability.total_cmp(&b.1.improbability));
+    let Some((turn, best)) = equal.first() else {
         return Ok(None);
     };
     // As recorded counts among the rivals where it fits as well.
-    let much_better = best.chi2 < MUCH_BETTER * now.reduced_chi2;
+    let much_better = best.chi2() < MUCH_BETTER * now.reduced_chi2;
     let more_plausible = now_improbable > IMPLAUSIBLE && best.improbability + IMPLAUSIBLE < now_improbable;
-    let [low, high] = USUAL;
-    let plausible = best.improbability < IMPLAUSIBLE
-        && (low..high).contains(&best.cutting[0])
-        && best.nrms < EXPLAINS_NRMS;
     let alike_now = now.reduced_chi2 <= ALIKE * least;
-    if !plausible || !(much_better || (alike_now && more_plausible)) {
+    if !best.is_plausible() || !(much_better || (alike_now && more_plausible)) {
         return Ok(None);
     }
     let weight = |improbability: f64| (-0.5 * (improbability - best.improbability)).exp();
-    let sum: f64 = equal.iter().map(|t| weight(t.improbability)).sum::<f64>()
+    let sum: f64 = equal.iter().map(|t| weight(t.1.improbability)).sum::<f64>()
         + if alike_now { weight(now_improbable) } else { 0.0 };
-    let matrix = read(data, best.turn).tool_from_dyno;
+    let matrix = read(data, *turn).tool_from_dyno;
     let rows: Vec<String> = matrix
         .iter()
         .map(|row| {
@@ -179,32 +152,29 @@ fn dyno_axes(data: &CuttingData) -> Result<Option<(SetupFinding, f64)>> {
     let others: Vec<String> = equal
         .iter()
         .skip(1)
-        .filter(|t| weight(t.improbability) > 0.05)
-        .map(|t| t.turn.words(["Fx", "Fy", "Fz"], [true; 3]))
+        .filter(|t| weight(t.1.improbability) > 0.05)
+        .map(|t| t.0.words(["Fx", "Fy", "Fz"], [true; 3]))
         .collect();
     let also = match others.is_empty() {
         true => String::new(),
         false => format!(" These records cannot tell it from: {}.", others.join("; or ")),
     };
-    let [ktc, krc, kac] = best.cutting;
     Ok(Some((
         SetupFinding {
             kind: "axes",
-            place: format!("dynamometer: {}", best.turn.words(["Fx", "Fy", "Fz"], [true; 3])),
+            place: format!("dynamometer: {}", turn.words(["Fx", "Fy", "Fz"], [true; 3])),
             value: None,
             std_error: None,
             unit: "",
             confidence: 0.97 / sum,
             remedy: format!(
-                "Write tool_from_dyno = [{}] in [dynamometer] of campaign.toml: read so, the waveforms leave {:.2} times the \
-                 variance of the noise (as it is {:.2}) and Ktc, Krc, Kac are {ktc:.0}, {krc:.0}, {kac:.0} N/mm². The \
-                 coefficients of the present matrix are wrong.{also}",
+                "Write tool_from_dyno = [{}] in [dynamometer] of campaign.toml: read so, {}. The coefficients of the present matrix are \
+                 wrong.{also}",
                 rows.join(", "),
-                best.chi2,
-                now.reduced_chi2,
+                best.in_words(now.reduced_chi2),
             ),
         },
-        best.chi2,
+        best.chi2(),
     )))
 }
 

@@ -1,6 +1,7 @@
 //! The fitted force model, and whether a cut can have its coefficients.
 
-use crate::identify::forces::cutting_study::calibrate_cutting;
+use crate::cutting::USUAL;
+use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, calibrate_cutting, cutting_nrms};
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 
 /// Another reading is believed for its waveform where it leaves this part of the misfit.
@@ -10,7 +11,7 @@ pub(super) const SUSPICIOUS: f64 = 1.3;
 /// Improbability (as χ²) of coefficients from which on they say that something is wrong.
 pub(super) const IMPLAUSIBLE: f64 = 9.0;
 
-pub(super) fn coefficient(calibration: &Calibration, name: &str) -> f64 {
+fn coefficient(calibration: &Calibration, name: &str) -> f64 {
     let found = calibration.parameters.iter().find(|p| p.name == name);
     found.map_or(0.0, |p| p.value)
 }
@@ -19,6 +20,54 @@ pub(super) fn coefficient(calibration: &Calibration, name: &str) -> f64 {
 pub(super) fn fit(data: &CuttingData) -> Option<Calibration> {
     let model = CuttingModel::new(data, true).ok()?;
     calibrate_cutting(&model, data).ok()
+}
+
+/// A reading of the records, fitted.
+pub(super) struct FittedReading {
+    pub(super) calibration: Calibration,
+    /// Error over the signal.
+    nrms: f64,
+    pub(super) improbability: f64,
+    /// Ktc, Krc, Kac.
+    cutting: [f64; 3],
+}
+
+impl FittedReading {
+    /// `data` as they are read.
+    pub(super) fn of(data: &CuttingData) -> Option<Self> {
+        let model = CuttingModel::new(data, true).ok()?;
+        let calibration = calibrate_cutting(&model, data).ok()?;
+        Some(FittedReading {
+            nrms: cutting_nrms(&model, data, &calibration.theta).ok()?,
+            improbability: improbability(&calibration),
+            cutting: ["ktc_n_per_mm2", "krc_n_per_mm2", "kac_n_per_mm2"]
+                .map(|n| coefficient(&calibration, n)),
+            calibration,
+        })
+    }
+
+    /// χ² per degree of freedom.
+    pub(super) fn chi2(&self) -> f64 {
+        self.calibration.reduced_chi2
+    }
+
+    /// Whether a cut can have such coefficients, and they explain most of what was recorded.
+    pub(super) fn is_plausible(&self) -> bool {
+        let [low, high] = USUAL;
+        self.improbability < IMPLAUSIBLE
+            && (low..high).contains(&self.cutting[0])
+            && self.nrms < EXPLAINS_NRMS
+    }
+
+    /// What it leaves and gives; `now_chi2` is left as the campaign has it.
+    pub(super) fn in_words(&self, now_chi2: f64) -> String {
+        let [ktc, krc, kac] = self.cutting;
+        format!(
+            "the waveforms leave {:.2} times the variance of the noise (as it is {now_chi2:.2}) and Ktc, Krc, Kac are {ktc:.0}, \
+             {krc:.0}, {kac:.0} N/mm²",
+            self.chi2()
+        )
+    }
 }
 
 /// How far coefficients are from those that metal cutting has, as a χ²: radial to tangential 0.4 within a factor of two,

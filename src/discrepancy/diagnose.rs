@@ -16,8 +16,8 @@ use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise
 use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, from_possible_size, held_out, rescue, try_again,
-    try_effect, try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_from, from_possible_size, held_out, rescue,
+    try_again, try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -542,14 +542,7 @@ impl<'a, S: Study> Engine<'a, S> {
         };
         drop(progress);
         if let Some((instance, start)) = &self.beginning {
-            let extended = study.extend(model, instance);
-            if let Ok(fit) = self.minimise(&extended, View::COARSE, start, REFINE) {
-                tried.push(Tried {
-                    instance: *instance,
-                    model: extended,
-                    fit,
-                });
-            }
+            tried.extend(fit_from(study, model, instance, start, View::COARSE, REFINE).ok());
         }
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
         // One for each effect and site: its best discrete choice, of which one with more parameters has to pay for them (Schwarz
@@ -837,14 +830,12 @@ impl<'a, S: Study> Engine<'a, S> {
         let Some((instance, own)) = best.parts.last() else {
             return Ok(None);
         };
-        let model = self.study.extend(self.model, instance);
         let (front, last) = (
             &best.theta[..self.base_count],
             &best.theta[best.theta.len() - own..],
         );
-        let fit = self.minimise(&model, View::FULL, &[front, last].concat(), REFINE)?;
-        let instance = *instance;
-        Ok(Some(Tried { instance, model, fit }))
+        let start = [front, last].concat();
+        fit_from(self.study, self.model, instance, &start, View::FULL, REFINE).map(Some)
     }
 
     /// Effects besides those of `leader` at the sizes that they would have were the response linear in them, most gain first.

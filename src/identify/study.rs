@@ -487,6 +487,24 @@ pub struct Tried<D: Modelled> {
     pub fit: Fit,
 }
 
+/// `model` with `instance`, fitted to a view from one point (solver's scale).
+///
+/// # Errors
+/// A model that cannot be set up there.
+pub fn fit_from<S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    instance: &InstanceOf<S>,
+    start: &[f64],
+    view: View,
+    stopping: Stopping,
+) -> Result<Tried<S::Domain>> {
+    let model = study.extend(model, instance);
+    let fit = minimise(&study.problem(&model, view), start, &model.bounds(), stopping)?;
+    let instance = *instance;
+    Ok(Tried { instance, model, fit })
+}
+
 /// Adds `instance` to `model` and fits it on the coarse view from the given points of the parameters in front; `None` if
 /// no start leads to a fit.
 pub fn try_effect<S: Study>(

@@ -202,7 +202,7 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
                     );
                     "Something is missing that has no name here".into()
                 }
-                None => format!("Something unknown {}", place.spot.words()),
+                None => format!("Something unknown {}", place.in_words()),
             }
         }
         None => "Something is missing that has no name here".into(),

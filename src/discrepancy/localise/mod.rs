@@ -24,7 +24,9 @@ use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
 use crate::identify::frfs::structure_study::{led_astray, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
-use crate::identify::study::{Effort, Extent, HeldOut, Looked, Study, Tried, View, held_out, look, race};
+use crate::identify::study::{
+    Effort, Extent, HeldOut, Looked, Study, Tried, View, fit_from, held_out, look, race,
+};
 use crate::identify::{StructureModel, StructureStudy};
 use screen::{CurvePoint, Screened};
 
@@ -59,6 +61,12 @@ pub struct LocalisedPlace {
 }
 
 impl LocalisedPlace {
+    /// `under the base (x)`; of both axes where what acts there is alike along two.
+    pub fn in_words(&self) -> String {
+        let form = self.best.as_ref().map(|best| best.first.form());
+        form.map_or_else(|| self.spot.words(), |form| form.place_in_words(self.spot))
+    }
+
     /// N/m, or N·m/rad where it turns.
     pub fn stiffness_unit(&self) -> &'static str {
         if self.spot.is_angle() { "N·m/rad" } else { "N/m" }
@@ -210,6 +218,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     let values = study.real_values(Extent::Coarse) as f64;
     let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
     let ties = ties(&screened);
+    let place_of = |spot: Spot| screened.iter().position(|s| s.spot == spot).map(|i| ties[i]);
     let mut chosen: Vec<(usize, Sought)> = leaders(&screened, &ties, FITTED)
         .into_iter()
         .map(|i| (i, Sought::new(&screened[i], starts.clone())))
@@ -222,8 +231,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .collect::<Result<_>>()?;
     for (k, there) in elsewhere.iter().enumerate() {
         for s in leaders(there, &self::ties(there), FITTED_ELSEWHERE) {
-            let place = screened.iter().position(|known| known.spot == there[s].spot);
-            let Some(place) = place.map(|i| ties[i]) else {
+            let Some(place) = place_of(there[s].spot) else {
                 continue;
             };
             if chosen.iter().all(|(known, _)| *known != place) {
@@ -232,15 +240,16 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         }
     }
     // A support that gives way leads the model far away, and what is linear there says least of it.
-    let supports = screened.iter().enumerate().filter(|(i, s)| {
+    let is_far = !starts.elsewhere.is_empty();
+    let supports = screened.iter().enumerate().filter(|(i, _)| {
         let is_known = chosen.iter().any(|(known, _)| known == i);
-        ties[*i] == *i && s.spot.is_series() && !is_known && !starts.elsewhere.is_empty()
+        is_far && ties[*i] == *i && !is_known
     });
     let supports: Vec<(usize, Sought)> = supports
         .filter_map(|(i, support)| {
-            let mut sought = Sought::new(support, starts.clone());
-            sought.forms = vec![support_form(support.spot)?];
-            Some((i, sought))
+            let forms = vec![support_form(support.spot)?];
+            let sought = Sought::new(support, starts.clone());
+            Some((i, Sought { forms, ..sought }))
         })
         .collect();
     chosen.extend(supports);
@@ -257,7 +266,6 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     };
     let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
     let (own, looked): (Vec<usize>, Vec<Looked<Structure>>) = looked.into_iter().unzip();
-    let place_of = |spot: Spot| screened.iter().position(|s| s.spot == spot).map(|i| ties[i]);
     let mut by_place: BTreeMap<usize, Vec<Tried<Structure>>> = BTreeMap::new();
     for (place, tried) in own.into_iter().zip(race(study, looked, FOLLOWED)) {
         let Some(tried) = tried else { continue };
@@ -711,13 +719,9 @@ fn second_form(
 
 /// The second form of a pair alone, from where it stands beside the first.
 fn without_the_first(study: &StructureStudy, bare: &StructureModel, pair: &Pair) -> Option<Tried<Structure>> {
-    let instance = pair.tried.instance;
-    let model = study.extend(bare, &instance);
     let both = &pair.tried.fit.theta;
     let start = [&both[..bare.parameters.len()], &both[pair.first_count..]].concat();
-    let problem = study.problem(&model, View::COARSE);
-    let fit = minimise(&problem, &start, &model.bounds(), REFINE).ok()?;
-    Some(Tried { instance, model, fit })
+    fit_from(study, bare, &pair.tried.instance, &start, View::COARSE, REFINE).ok()
 }
 
 /// The stiffness of a form that is a spring or has one, N/m.
@@ -743,18 +747,13 @@ fn along_its_axis(
     let form = drawn::form_of(tried.instance.variant);
     let (spot, values) = drawn::along_its_axis(spot, form, &own)?;
     let instance = drawn::instance(spot, form);
-    let model = study.extend(model, &instance);
-    let own = model.parameters[count..].iter().zip(values);
-    let own = own.map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
-    let start: Vec<f64> = front.iter().copied().chain(own).collect();
-    let fit = minimise(
-        &study.problem(&model, View::COARSE),
-        &start,
-        &model.bounds(),
-        REFINE,
-    )
-    .ok()?;
-    let renamed = Tried { instance, model, fit };
+    let own = study.extend(model, &instance).parameters[count..]
+        .iter()
+        .zip(values)
+        .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
+        .collect::<Vec<f64>>();
+    let start = [front, &own].concat();
+    let renamed = fit_from(study, model, &instance, &start, View::COARSE, REFINE).ok()?;
     Some((spot, renamed))
 }
 

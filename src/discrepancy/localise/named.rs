@@ -6,7 +6,7 @@ use super::Localisation;
 use crate::Result;
 use crate::effects::{Instance, Structure};
 use crate::identify::levenberg_marquardt::Stopping;
-use crate::identify::study::{Study, View};
+use crate::identify::study::{Study, View, own_starts};
 use crate::identify::{LeastSquares, StructureModel, StructureStudy, minimise};
 
 /// Share of what the drawn form takes away that an effect must take away in a few steps to be worth another diagnosis.
@@ -37,20 +37,16 @@ pub fn named(
     let hints = study.hints(model, &found.baseline.theta)?;
     let fits = instances.par_iter().filter_map(|instance| {
         let extended = study.extend(model, instance);
-        let own = &extended.parameters[count..];
-        let known = study.known(&extended);
-        let proposed = instance.effect.starts(instance.at(), &known, &hints);
-        let nominal: Vec<f64> = own.iter().map(|p| p.nominal).collect();
         let problem = study.problem(&extended, View::GLANCE);
-        let start = std::iter::once(nominal)
-            .chain(proposed)
-            .map(|values| {
-                let own = own.iter().zip(values).map(|(p, value)| {
+        let starts = own_starts(study, &extended, count, instance, &hints);
+        let start = starts
+            .into_iter()
+            .map(|own| {
+                let own = extended.parameters[count..].iter().zip(own).map(|(p, start)| {
                     let mut drawn = best.parts().flat_map(|part| &part.parameters);
                     // `branch@link-3.x.mass_kg`
                     let drawn = drawn.find(|d| d.name.rsplit('.').next() == p.name.rsplit('.').next());
-                    let value = drawn.map_or(value, |d| d.value);
-                    p.internal(value.clamp(p.bounds[0], p.bounds[1]))
+                    drawn.map_or(start, |d| p.internal(d.value.clamp(p.bounds[0], p.bounds[1])))
                 });
                 best.theta[..count].iter().copied().chain(own).collect()
             })

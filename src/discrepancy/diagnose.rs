@@ -274,7 +274,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .first()
             .is_some_and(|best| !verdict::is_noise(self.reduced_chi2(best)))
         {
-            self.begin_at_possible_sizes(&tried, &mut refined)?;
+            self.begin_at_possible_sizes(&tried, &coarse_base, &mut refined)?;
         }
 
         if base_reduced < FAINT {
@@ -629,9 +629,15 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(())
     }
 
-    /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, from possible ones. What
-    /// comes to lie before others is put among the leaders.
-    fn begin_at_possible_sizes(&self, tried: &[TriedOf<S>], refined: &mut Vec<TriedOf<S>>) -> Result<()> {
+    /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, and those on promise
+    /// that a look from where the model stands has passed over, from possible sizes. What comes to lie before others is put among
+    /// the leaders.
+    fn begin_at_possible_sizes(
+        &self,
+        tried: &[TriedOf<S>],
+        coarse_base: &Fit,
+        refined: &mut Vec<TriedOf<S>>,
+    ) -> Result<()> {
         let bases = [self.calibration.theta.clone(), self.model.nominal_theta()];
         let cannot_be = |t: &&TriedOf<S>| {
             let own = self.base_count..t.model.parameters.len();
@@ -643,10 +649,23 @@ impl<'a, S: Study> Engine<'a, S> {
             });
             impossible || own.clone().any(|i| t.fit.at_bound.contains(&i))
         };
-        let found: Vec<Option<TriedOf<S>>> = tried
+        // Every choice of it: they differ in what they do, and the one that led need not be the one that explains.
+        let passed_over = self.instances.iter().filter(|i| i.effect.on_promise());
+        let passed_over = passed_over.filter_map(|instance| {
+            let model = self.study.extend(self.model, instance);
+            let fit = vanished(&model, coarse_base)?;
+            let instance = *instance;
+            Some(Tried { instance, model, fit })
+        });
+        let stuck: Vec<TriedOf<S>> = tried
+            .iter()
+            .filter(cannot_be)
+            .cloned()
+            .chain(passed_over)
+            .collect();
+        let found: Vec<Option<TriedOf<S>>> = stuck
             .par_iter()
             .filter(|t| t.instance.site == Site::Everywhere)
-            .filter(cannot_be)
             .map(|t| from_possible_size(self.study, t, &bases, REFINE))
             .collect::<Result<_>>()?;
         put_among(refined, found.into_iter().flatten());

@@ -268,6 +268,7 @@ fn drift(record: &TimeRecord) -> Vec<String> {
     let samples: Vec<&[f64]> = forces(record).map(|(_, c)| c.samples.as_slice()).collect();
     let spindle = Spindle {
         samples_per_revolution: record.len() as f64 / DRIFT_BLOCKS,
+        sample_rate_hz: record.sample_rate_hz,
         teeth: 1,
     };
     if samples.is_empty() || spindle.samples_per_revolution < 4.0 {

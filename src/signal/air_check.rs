@@ -3,7 +3,8 @@
 
 use std::ops::Range;
 
-use super::blocks::{line, mean, robust_std};
+use super::blocks::{Spindle, line, mean, robust_std};
+use super::mains::without_hum;
 use crate::data::Sample;
 
 /// Part of the cut's tooth-passing power that air may hold: unbalance and what resonates with it stay below a third of
@@ -23,6 +24,9 @@ const LEVEL_SIGMAS: f64 = 8.0;
 /// The level of a cut that merely changes goes on changing: a step from air to cut is this many times what happens on either
 /// side of it.
 const LEVEL_OVER_CHANGE: f64 = 3.0;
+/// Part of the cut's force that is next to none, and times its fluctuation that air may have.
+const NEXT_TO_NONE: f64 = 0.05;
+const NO_LOUDER: f64 = 1.2;
 /// Turns looked at, at most: those nearest to where air and cut meet.
 const MOST_TURNS: usize = 60;
 
@@ -82,8 +86,92 @@ fn level<S: Sample>(samples: &[S], range: &Range<usize>, turn: f64) -> (f64, f64
     (centre, slope * turns as f64, robust_std(&residual))
 }
 
-/// The part of `candidate` that is air next to the cut in `cutting`, if any. `turn`: samples a revolution.
+/// The part of `candidate` that is air next to the cut in `cutting`, if any: as the record is, or without the hum of the mains, which
+/// at many speeds comes back turn after turn and in air is all that does; or all of it, where its force is next to none.
 pub(super) fn air_in<S: Sample>(
+    channels: &[&[S]],
+    candidate: &Range<usize>,
+    cutting: &Range<usize>,
+    spindle: Spindle,
+) -> Option<Range<usize>> {
+    // What was followed from either end may overlap.
+    if cutting.is_empty() {
+        return None;
+    }
+    let turn = spindle.samples_per_revolution;
+    let most = (MOST_TURNS as f64 * turn) as usize;
+    let is_before = candidate.end <= cutting.start;
+    let near = match is_before {
+        true => candidate.end - candidate.len().min(most)..candidate.end,
+        false => candidate.start..candidate.start + candidate.len().min(most),
+    };
+    let cut = core(cutting, most);
+    air_as_it_is(channels, candidate, cutting, turn)
+        .or_else(|| {
+            let found = air_without_hum(channels, [&near, &cut], spindle)?;
+            // Of what lies further from the cut than was looked at, what was looked at speaks.
+            Some(match is_before {
+                true => candidate.start..found.end,
+                false => found.start..candidate.end,
+            })
+        })
+        .or_else(|| is_next_to_none(channels, &near, &cut, turn).then(|| candidate.clone()))
+}
+
+/// The part of `near` that without hum is air next to a `cut` without hum.
+fn air_without_hum<S: Sample>(
+    channels: &[&[S]],
+    [near, cut]: [&Range<usize>; 2],
+    spindle: Spindle,
+) -> Option<Range<usize>> {
+    let turn = spindle.samples_per_revolution;
+    let tooth_hz = spindle.sample_rate_hz / turn * spindle.teeth.max(1) as f64;
+    let clean = |range: &Range<usize>| {
+        let parts: Vec<&[S]> = channels.iter().map(|c| &c[range.clone()]).collect();
+        without_hum(&parts, spindle.sample_rate_hz, tooth_hz)
+    };
+    // One next to the other, in their order.
+    let [first, second] = if near.start < cut.start {
+        [near, cut]
+    } else {
+        [cut, near]
+    };
+    let joined = clean(first)?.into_iter().zip(clean(second)?);
+    let joined: Vec<Vec<f64>> = joined.map(|(first, second)| [first, second].concat()).collect();
+    let joined: Vec<&[f64]> = joined.iter().map(Vec::as_slice).collect();
+    let ends = [0..first.len(), first.len()..first.len() + second.len()];
+    let [own, of_cut] = if near.start < cut.start {
+        [&ends[0], &ends[1]]
+    } else {
+        [&ends[1], &ends[0]]
+    };
+    let found = air_as_it_is(&joined, own, of_cut, turn)?;
+    Some(near.start + (found.start - own.start)..near.start + (found.end - own.start))
+}
+
+/// Is the force in `air` next to none against that of the `cut`? An amplifier is reset before it, and what repeats there (hum at the
+/// tooth passing frequency) is no more than in the cut.
+fn is_next_to_none<S: Sample>(channels: &[&[S]], air: &Range<usize>, cut: &Range<usize>, turn: f64) -> bool {
+    let size = |range: &Range<usize>, less: Option<&Range<usize>>| -> f64 {
+        let of = |c: &&[S]| level(c, range, turn).0 - less.map_or(0.0, |less| level(c, less, turn).0);
+        channels.iter().map(|c| of(c).powi(2)).sum::<f64>().sqrt()
+    };
+    let is_quieter = content(channels, air, turn)
+        .zip(content(channels, cut, turn))
+        .is_some_and(|(air, cut)| air.1 < NO_LOUDER * cut.1);
+    is_quieter
+        && size(air, None) < NEXT_TO_NONE * size(cut, Some(air))
+        && stands_off(channels, air, cut, turn)
+}
+
+/// The middle of a cut, of so many samples at most.
+fn core(cutting: &Range<usize>, most: usize) -> Range<usize> {
+    let spare = cutting.len().saturating_sub(most) / 2;
+    cutting.start + spare..cutting.end - spare
+}
+
+/// The part of `candidate` that is air next to the cut in `cutting`, if any. `turn`: samples a revolution.
+fn air_as_it_is<S: Sample>(
     channels: &[&[S]],
     candidate: &Range<usize>,
     cutting: &Range<usize>,
@@ -91,8 +179,7 @@ pub(super) fn air_in<S: Sample>(
 ) -> Option<Range<usize>> {
     let most = (MOST_TURNS as f64 * turn) as usize;
     let is_before = candidate.end <= cutting.start;
-    let spare = cutting.len().saturating_sub(most) / 2;
-    let core = cutting.start + spare..cutting.end - spare;
+    let core = core(cutting, most);
     let (cut, cut_all) = content(channels, &core, turn)?;
     let mut air = candidate.clone();
     loop {
@@ -151,6 +238,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     const TURN: f64 = 60.3;
+    const SPINDLE: Spindle = Spindle {
+        samples_per_revolution: TURN,
+        sample_rate_hz: 50.0 * TURN,
+        teeth: 2,
+    };
 
     /// Pulses of two teeth, the second with `second` times the force of the first, times `force`, and noise.
     fn record(length: usize, seed: u64, second: f64, noise: f64, force: impl Fn(f64) -> f64) -> Vec<f64> {
@@ -167,7 +259,7 @@ mod tests {
 
     fn found(samples: &[f64], air_turns: f64) -> Option<Range<usize>> {
         let split = (air_turns * TURN) as usize;
-        air_in(&[samples], &(0..split), &(split..samples.len()), TURN)
+        air_in(&[samples], &(0..split), &(split..samples.len()), SPINDLE)
     }
 
     #[test]
@@ -220,5 +312,50 @@ mod tests {
             assert!(found(&samples, 12.0).is_some());
         }
         assert_eq!(found(&record(100, 0, 0.0, 1.0, |_| 0.0), 1.0), None);
+    }
+
+    /// Hum that comes back turn after turn, twice as strong as what the teeth do.
+    #[test]
+    fn hum_does_not_make_a_cut_of_air_nor_air_of_a_cut() {
+        let hum = |i: usize, hz: f64| {
+            400.0 * (std::f64::consts::TAU * hz * i as f64 / SPINDLE.sample_rate_hz).sin()
+        };
+        for seed in 0..10 {
+            for hz in [50.0, 150.0, 60.0] {
+                let air = |t: f64| if t < 12.0 { 0.0 } else { 1.0 };
+                let step = |t: f64| if t < 12.0 { 0.6 } else { 1.0 };
+                let with_hum = |force: &dyn Fn(f64) -> f64| -> Vec<f64> {
+                    let record = record(3000, seed, 1.0, 6.0, force);
+                    record
+                        .into_iter()
+                        .enumerate()
+                        .map(|(i, v)| v + hum(i, hz))
+                        .collect()
+                };
+                let end = (12.0 * TURN) as usize;
+                assert_eq!(found(&with_hum(&air), 12.0), Some(0..end), "{seed} {hz}");
+                assert_eq!(found(&with_hum(&step), 12.0), None, "{seed} {hz}");
+            }
+        }
+    }
+
+    /// Hum at the tooth passing frequency: the force is next to none in air, and in no piece of a cut.
+    #[test]
+    fn hum_that_looks_like_teeth_is_told_by_the_force() {
+        let hum = |i: usize| 60.0 * (std::f64::consts::TAU * 2.0 * i as f64 / TURN).sin();
+        for seed in 0..10 {
+            let with_hum = |least: f64| -> Vec<f64> {
+                let force = |t: f64| if t < 12.0 { least } else { 1.0 };
+                let record = record(3000, seed, 1.0, 6.0, force);
+                record
+                    .into_iter()
+                    .enumerate()
+                    .map(|(i, v)| v - 5.0 + hum(i))
+                    .collect()
+            };
+            assert!(found(&with_hum(0.0), 12.0).is_some());
+            assert_eq!(found(&with_hum(0.2), 12.0), None);
+            assert_eq!(found(&with_hum(0.6), 12.0), None);
+        }
     }
 }

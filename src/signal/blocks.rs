@@ -3,6 +3,17 @@
 use crate::data::Sample;
 use crate::statistics::quantile;
 
+/// What turns, and how the record is sampled.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spindle {
+    /// At the stated speed; not a whole number in general.
+    pub samples_per_revolution: f64,
+    /// Samples a second, Hz.
+    pub sample_rate_hz: f64,
+    /// Number of teeth (lips).
+    pub teeth: usize,
+}
+
 /// Mean and fluctuation of each consecutive block of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalBlocks {

@@ -16,7 +16,7 @@ mod spindle_track;
 mod steady_window;
 mod tooth_line;
 
-pub use blocks::{SignalBlocks, mean, median};
+pub use blocks::{SignalBlocks, Spindle, mean, median};
 pub(crate) use blocks::{line, robust_std};
 pub use drift::{Air, DriftLine, fit_drift};
 pub use engagement::change;
@@ -28,5 +28,5 @@ pub use order_spectrum::{
 };
 pub use pulses::pulsed_channel;
 pub use spindle_track::{SpindleTrack, spindle_track};
-pub use steady_window::{Phases, Spindle, find_phases, whole_revolutions};
+pub use steady_window::{Phases, find_phases, whole_revolutions};
 pub use tooth_line::{ToothLine, tooth_line};

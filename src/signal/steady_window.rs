@@ -8,21 +8,12 @@
 use std::ops::Range;
 
 use super::air_check::air_in;
-use super::blocks::{SignalBlocks, line, median, robust_std};
+use super::blocks::{SignalBlocks, Spindle, line, median, robust_std};
 use super::drift::Air;
 use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
 use super::engagement::{full_engagement, loudness};
 use crate::data::Sample;
 use crate::statistics::quantile;
-
-/// What turns, and how the record is sampled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spindle {
-    /// At the stated speed; not a whole number in general.
-    pub samples_per_revolution: f64,
-    /// Number of teeth (lips).
-    pub teeth: usize,
-}
 
 /// The parts of a record, as sample ranges.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,8 +78,7 @@ pub fn find_phases<S: Sample>(
             } else {
                 count as f64
             });
-        let turn = spindle.samples_per_revolution;
-        let air = |r: Range<usize>| air_in(channels, &r, &cutting, turn).filter(long_enough);
+        let air = |r: Range<usize>| air_in(channels, &r, &cutting, spindle).filter(long_enough);
         let found = before.is_some() || after.is_some();
         (before, after) = (before.and_then(air), after.and_then(air));
         air_is_doubtful = found && before.is_none() && after.is_none();
@@ -302,6 +292,7 @@ mod tests {
         let channels: Vec<&[f64]> = data.iter().map(Vec::as_slice).collect();
         let spindle = Spindle {
             samples_per_revolution: RATE / 20.0,
+            sample_rate_hz: RATE,
             teeth: 4,
         };
         find_phases(&channels, spindle, entry).unwrap()
@@ -402,6 +393,7 @@ mod tests {
     fn a_record_too_short_or_without_channels_gives_nothing() {
         let spindle = Spindle {
             samples_per_revolution: 100.0,
+            sample_rate_hz: RATE,
             teeth: 2,
         };
         assert_eq!(find_phases::<f64>(&[], spindle, None), None);
@@ -411,6 +403,7 @@ mod tests {
         assert_eq!((clip.air, clip.steady), (Air::default(), 25..225));
         let broken = Spindle {
             samples_per_revolution: f64::NAN,
+            sample_rate_hz: f64::NAN,
             teeth: 0,
         };
         assert_eq!(find_phases(&[&[1.0; 5000]], broken, None), None);
@@ -438,7 +431,7 @@ mod tests {
                 .iter()
                 .flat_map(|&(level, n)| (0..n).map(|_| level + rng.random_range(-1.0..1.0)).collect::<Vec<_>>())
                 .collect();
-            let spindle = Spindle { samples_per_revolution: turn, teeth };
+            let spindle = Spindle { samples_per_revolution: turn, sample_rate_hz: RATE, teeth };
             if let Some(p) = find_phases(&[&data, &data], spindle, entry) {
                 proptest::prop_assert!(!p.steady.is_empty() && p.steady.end <= data.len());
                 proptest::prop_assert!(p.air.before.is_none_or(|r| r.end <= p.steady.start));

@@ -368,6 +368,7 @@ fn phases<S: Sample>(
     }
     let spindle = Spindle {
         samples_per_revolution,
+        sample_rate_hz: rate,
         teeth: tool.teeth,
     };
     let found = find_phases(&carrying, spindle, entry);

@@ -145,7 +145,7 @@ impl MillingCut {
             }
             return unit;
         };
-        for slice in shape.slices(self.axial_depth_mm, self.immersion) {
+        for slice in shape.slices(self.axial_depth_mm, self.immersion, orders) {
             let Some(window) = slice.immersion.map(window) else {
                 continue;
             };

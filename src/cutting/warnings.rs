@@ -7,10 +7,11 @@ use super::plausibility::unit_slip;
 use crate::cutting::fit::estimate::{CfcOptions, RegressionMethod};
 use crate::cutting::fit::group::{Coefficient, ForceGroup, distinct};
 use crate::cutting::fit::outlier::CutMisfit;
+use crate::cutting::force_model::average_force::average_row;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::NO_AIR;
 use crate::cutting::measured::cut_analysis::{CutAnalysis, NOTHING_REPEATS, Notice, WRONG_SPEED};
-use crate::data::Process;
+use crate::data::{CutGeometry, Process};
 
 /// Notices of all records, one sentence a kind.
 pub(super) fn of_records(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Vec<String> {
@@ -184,6 +185,55 @@ pub(super) fn of_shape(trials: &CuttingTrials, fit: &ForceGroup) -> Option<Strin
              (`tool_from_dyno` in [dynamometer])"
         )
     })
+}
+
+/// Cuts in which the tool touches nothing by what is stated.
+pub(super) fn of_missed(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
+    let touches = |c: &CutAnalysis| {
+        let geometry = &trials.cuts[c.cut].geometry;
+        let rows = ForceAxis::of(c.process)
+            .iter()
+            .map(|axis| average_row(trials.tool, geometry, *axis));
+        rows.flatten().flatten().any(|value| value != 0.0)
+    };
+    let missed: Vec<&str> = cuts
+        .iter()
+        .filter(|c| !touches(c))
+        .map(|c| c.id.as_str())
+        .collect();
+    (!missed.is_empty()).then(|| {
+        format!(
+            "cut {}: by the stated engagement the tool touches nothing: start_deg and exit_deg hold at the tool's diameter, and down at \
+             this axial depth a rounded edge is narrower; a side of the work y mm from the axis, towards the side where a tooth \
+             enters in up milling, is arccos(2 y / diameter_mm)",
+            missed.join(", ")
+        )
+    })
+}
+
+/// Holes into the full: the chisel edge presses as well.
+pub(super) fn of_full_holes(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
+    let is_full = |c: &&&CutAnalysis| {
+        let geometry = &trials.cuts[c.cut].geometry;
+        matches!(geometry, CutGeometry::Drilling { pilot_diameter_mm, .. } if *pilot_diameter_mm <= 0.0)
+    };
+    let full = cuts.iter().filter(is_full).count();
+    let holes = match (full, cuts.len()) {
+        (0, _) => return None,
+        (full, all) if full == all => "all holes are".to_string(),
+        (full, all) => format!("{full} of {all} holes are"),
+    };
+    let then = match full == cuts.len() {
+        true => "for those of the lips drill some holes with a pilot hole as wide as the web",
+        false => {
+            "one set does not hold for these and the holes with a pilot hole; \
+             `lobestone add DIR chisel-edge` tells the two apart"
+        }
+    };
+    Some(format!(
+        "{holes} drilled into the full, where the chisel edge presses besides the lips, often with a third to a half of the thrust: that \
+         goes into Kfc and Kfe (the torque is hardly touched); {then}"
+    ))
 }
 
 /// What the regressions themselves have to say: `all` cuts of a process, and its groups by speed.

@@ -64,23 +64,6 @@ pub struct ChannelRule {
     pub rate_hz: Option<f64>,
 }
 
-/// Reads a unit in which a charge counts as a voltage: `pC` → 10⁻¹² V.
-pub fn unit_of_charge_or_other(label: &str) -> Option<Unit> {
-    let charges = [("pC", 1e-12), ("nC", 1e-9), ("µC", 1e-6)];
-    let Some((name, factor)) = charges.into_iter().find(|(name, _)| label.contains(name)) else {
-        return units::parse(label);
-    };
-    let unit = units::parse(&label.replace(name, "V"))?;
-    let is_below = label
-        .split_once('/')
-        .is_some_and(|(_, below)| below.contains(name));
-    let factor = if is_below { 1.0 / factor } else { factor };
-    Some(Unit {
-        factor: unit.factor * factor,
-        ..unit
-    })
-}
-
 impl Gain {
     /// `500 N/V`, `2 kN/V`, `-3.85 pC/N`, `10 mV/N`, `350 N/A`; a moment likewise.
     ///
@@ -94,14 +77,17 @@ impl Gain {
         let (number, label) = text.split_at(split);
         let value = number.trim().replace(',', ".").parse::<f64>();
         let value = value.ok().filter(|v| v.is_finite() && *v != 0.0);
-        let (Some(value), Some(unit)) = (value, unit_of_charge_or_other(label)) else {
+        let (Some(value), Some(unit)) = (value, units::unit_of_charge_or_other(label)) else {
             return Err(format!("{text:?} is no gain"));
         };
         let si = value * unit.factor;
         let (above, below) = label.split_once('/').unwrap_or((label, ""));
         let is_load = |u: Unit| [Dimension::FORCE, Dimension::MOMENT].contains(&u.dimension);
         let is_electric = |u: Unit| [Dimension::VOLTAGE, Dimension::CURRENT].contains(&u.dimension);
-        if let (Some(above), Some(below)) = (unit_of_charge_or_other(above), unit_of_charge_or_other(below)) {
+        if let (Some(above), Some(below)) = (
+            units::unit_of_charge_or_other(above),
+            units::unit_of_charge_or_other(below),
+        ) {
             if is_load(above) && is_electric(below) {
                 return Ok(Gain::PerElectric(si, below));
             }
@@ -441,7 +427,7 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, Plain
 /// What a force is (`fx`), and how its channel is called.
 pub type NamedForce = (&'static str, String);
 
-/// Forces of one cut in a file that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
+/// Forces of one cut in a file of several, or in one that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
 /// cut), and the channels.
 pub type TimelessCut = (String, Vec<NamedForce>);
 
@@ -466,7 +452,8 @@ pub fn timeless(path: &Path) -> Result<Timeless> {
     })
 }
 
-fn forces_of(records: &[TimeRecord]) -> Vec<NamedForce> {
+/// What of the first record's channels are forces.
+pub fn forces_of(records: &[TimeRecord]) -> Vec<NamedForce> {
     let of = |channel: &Channel| {
         let what = match channel.role {
             ChannelRole::ForceX => "fx",
@@ -481,7 +468,8 @@ fn forces_of(records: &[TimeRecord]) -> Vec<NamedForce> {
     first.map_or_else(Vec::new, |record| record.channels.iter().filter_map(of).collect())
 }
 
-fn cuts_of(records: &[TimeRecord]) -> Vec<TimelessCut> {
+/// The cuts in a file whose channels are called by the cut as well (`Fx_R_1`, `Fx_R_2`); one where each force stands there once.
+pub fn cuts_of(records: &[TimeRecord]) -> Vec<TimelessCut> {
     let named = |channel: &Channel| -> Option<(&'static str, String, String)> {
         let name = channel.name.as_str();
         let lower = name.to_ascii_lowercase();

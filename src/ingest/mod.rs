@@ -23,8 +23,8 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{
-    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, read_file_at, read_forces_with,
-    read_time_with, timeless, unit_of_charge_or_other,
+    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, cuts_of, forces_of, read_file_at,
+    read_forces_with, read_time_with, timeless,
 };
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord, TimeFile};
 pub use formats::columns::{
@@ -43,6 +43,7 @@ pub use quality::quality_warnings;
 pub use read::{read_file, read_frf_file, read_frfs, read_memory, read_time};
 pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer, is_called_marker};
 pub use text::shown;
+pub use units::unit_of_charge_or_other;
 
 /// The first sheet of a workbook (xlsx) as tab separated text; `None` for all else.
 pub fn sheet_text(bytes: &[u8]) -> Option<String> {

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::text::{Notes, is_binary, without_byte_order_mark};
 use super::units;
+use crate::data::Channel;
 use crate::ingest::formats::force;
 use crate::ingest::tables::table::Header;
 use crate::{Error, Result};
@@ -59,6 +60,12 @@ impl PlainColumn {
             is_state: name.is_some() && is_state(values),
             rows: values.len(),
         }
+    }
+
+    /// A channel of a file that says its times.
+    pub fn of_channel(channel: &Channel) -> PlainColumn {
+        let seen = channel.samples.len().min(ROWS);
+        PlainColumn::of(Some(&channel.name), &channel.samples[..seen], false)
     }
 
     /// Does it count the rows (or milliseconds)? Then it is no time in seconds, and the rate must be said.

@@ -391,6 +391,23 @@ impl Channel {
     }
 }
 
+/// Reads a unit in which a charge counts as a voltage: `pC` → 10⁻¹² V.
+pub fn unit_of_charge_or_other(label: &str) -> Option<Unit> {
+    let charges = [("pC", 1e-12), ("nC", 1e-9), ("µC", 1e-6)];
+    let Some((name, factor)) = charges.into_iter().find(|(name, _)| label.contains(name)) else {
+        return parse(label);
+    };
+    let unit = parse(&label.replace(name, "V"))?;
+    let is_below = label
+        .split_once('/')
+        .is_some_and(|(_, below)| below.contains(name));
+    let factor = if is_below { 1.0 / factor } else { factor };
+    Some(Unit {
+        factor: unit.factor * factor,
+        ..unit
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -292,6 +292,7 @@ mod tests {
                     from_name: names::facts_of(name),
                     from_header: Default::default(),
                     part: None,
+                    says_times: true,
                 })
                 .collect(),
             ..Scan::default()

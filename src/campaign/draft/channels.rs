@@ -8,9 +8,14 @@ use crate::Result;
 use crate::ingest::{NamedForce, PlainColumn, taken_for};
 
 /// A section for the time, where there is one, and for each signal, taken as x, y, z and torque in their order.
-pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec<DraftTable>> {
+/// `says_times`: the files do, whatever their columns are called.
+pub(super) fn channels(
+    columns: &[PlainColumn],
+    says_times: bool,
+    answers: &Answers,
+) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
-    let has_time = columns.first().is_some_and(PlainColumn::is_clock);
+    let has_time = says_times || columns.first().is_some_and(PlainColumn::is_clock);
     for (place, column, name) in taken_for(columns) {
         let mut making = Making::new(answers, "channel", name, true);
         making.fact("name", Kind::Text, name);
@@ -53,10 +58,7 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
             making.add(unit, &[])?;
             let unit = making.table.entries.last().and_then(Entry::value_text);
             let is_electric = unit.is_some_and(|u| u.contains(['V', 'C']));
-            let gain =
-                "what the amplifier makes of it, with its unit: N/V, mV/N, pC/N (none for values in N)";
-            let gain = Entry::new("gain", Kind::Text, gain, "500 N/V");
-            making.add(if is_electric { gain } else { gain.optional() }, &[])?;
+            making.add(if is_electric { gain() } else { gain().optional() }, &[])?;
             if !has_time && name == "fx" {
                 let rate = Entry::new("rate_hz", Kind::Number, "samples a second, Hz", "10000.0");
                 making.add(rate, &[])?;
@@ -68,14 +70,16 @@ pub(super) fn channels(columns: &[PlainColumn], answers: &Answers) -> Result<Vec
 }
 
 /// Sections for the channels of cuts that lie in one file: which of its arrays are those of which cut, and how fast they were
-/// sampled.
+/// sampled where the file does not say it.
 pub(super) fn channels_of_cuts(forces: &[FoundForce], answers: &Answers) -> Result<Vec<DraftTable>> {
     let mut tables = Vec::new();
     for (force, id) in forces.iter().zip(cut_ids(forces)) {
         for channel in force.part.iter().flat_map(|(_, channels)| channels) {
             let mut making = named(channel, answers);
             making.fact("cut", Kind::Text, &id);
-            making.add(rate(), &[])?;
+            if !force.says_times {
+                making.add(rate(), &[])?;
+            }
             tables.push(making.table);
         }
     }
@@ -93,6 +97,24 @@ pub(super) fn timeless(forces: &[NamedForce], answers: &Answers) -> Result<Vec<D
         tables.push(making.table);
     }
     Ok(tables)
+}
+
+/// Sections for forces whose values are what the amplifier gave: its gain is what is missing.
+pub(super) fn electric(forces: &[(NamedForce, String)], answers: &Answers) -> Result<Vec<DraftTable>> {
+    let mut tables = Vec::new();
+    for (channel, unit) in forces {
+        let mut making = named(channel, answers);
+        making.fact("unit", Kind::Text, unit);
+        making.add(gain(), &[])?;
+        tables.push(making.table);
+    }
+    Ok(tables)
+}
+
+fn gain() -> Entry {
+    let of_amplifier =
+        "what the amplifier makes of it, with its unit: N/V, mV/N, pC/N (none for values in N)";
+    Entry::new("gain", Kind::Text, of_amplifier, "500 N/V")
 }
 
 /// A section for a channel that has a name in its file.

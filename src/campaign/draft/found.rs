@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::names::Facts;
 use crate::data::Quantity;
-use crate::ingest::{PlainColumn, TimelessCut};
+use crate::ingest::{NamedForce, PlainColumn, TimelessCut};
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
 #[derive(Debug, Default, Clone)]
@@ -14,11 +14,13 @@ pub struct Scan {
     pub frfs: Vec<FoundFrf>,
     /// Files with cutting forces over time.
     pub forces: Vec<FoundForce>,
-    /// What the columns of the force files hold, where none of them names any: all have as many.
+    /// What the columns of the force files hold, where none of them says which are the forces: all have as many.
     pub columns: Vec<PlainColumn>,
     /// What the channels of the force files are (`fx`) and how they are called, where none of the files says its times or
     /// sampling rate: all have the same.
     pub timeless: Vec<(&'static str, String)>,
+    /// The same, with their unit, where their values are volts or charges: what the amplifier makes of them is not in the files.
+    pub electric: Vec<(NamedForce, String)>,
     /// Robot files, as paths.
     pub robots: Vec<String>,
     /// Tables that look like lists of cuts.
@@ -52,6 +54,8 @@ pub struct FoundForce {
     pub(crate) from_header: Facts,
     /// Id and channels, where the file holds several cuts and this is one of them.
     pub part: Option<TimelessCut>,
+    /// The file says its times, or how fast it was sampled.
+    pub says_times: bool,
 }
 
 /// Name without folders and ending.

@@ -12,8 +12,8 @@ use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{Channel, ChannelRole, Quantity, RobotSpec, TimeRecord};
 use crate::ingest::{
-    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, is_called_acceleration, is_called_marker,
-    plain_columns, sheet_text, survey, timeless,
+    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, cuts_of, forces_of, is_called_acceleration,
+    is_called_marker, plain_columns, sheet_text, survey, timeless, unit_of_charge_or_other,
     units::{self, Dimension},
 };
 use crate::progress::Progress;
@@ -37,10 +37,14 @@ enum Seen {
     CutList(PathBuf),
     Frf(FoundFrf),
     Force(FoundForce),
+    /// Forces in volts or as charges.
+    Electric(FoundForce, Vec<(NamedForce, String)>),
     /// Cuts of one file.
     Several(Vec<FoundForce>),
     /// Numbers without names, and why they were not understood.
     Nameless(FoundForce, Vec<PlainColumn>, String),
+    /// Signals over time whose names say nothing of forces, and what else they may be: forces where a list of cuts lies beside them.
+    Signals(FoundForce, Vec<PlainColumn>, String),
     /// Forces without times: what each is and its channel, and why the file was not understood.
     Timeless(FoundForce, Vec<NamedForce>, String),
     NotUsed(String, String),
@@ -87,19 +91,33 @@ pub fn scan(dir: &Path) -> Result<Scan> {
             seen
         })
         .collect();
-    let (mut nameless, mut timeless) = (Vec::new(), Vec::new());
+    let (mut nameless, mut timeless, mut signals) = (Vec::new(), Vec::new(), Vec::new());
     for one in seen {
         match one {
             Seen::CutList(path) => scan.cut_lists.push(path),
             Seen::Frf(frf) => scan.frfs.push(frf),
             Seen::Force(force) => scan.forces.push(force),
+            Seen::Electric(force, channels) => {
+                scan.forces.push(force);
+                // One amplifier: its channels are called alike in all files.
+                if scan.electric.is_empty() {
+                    scan.electric = channels;
+                }
+            }
             Seen::Several(forces) => scan.forces.extend(forces),
             Seen::Nameless(force, columns, why) => nameless.push((force, columns, why)),
+            Seen::Signals(force, columns, why) => signals.push((force, columns, why)),
             Seen::Timeless(force, channels, why) => timeless.push((force, channels, why)),
             Seen::NotUsed(path, why) => scan.not_used.push((path, why)),
         }
     }
     take_timeless(&mut scan, timeless);
+    if !scan.cut_lists.is_empty() && nameless.is_empty() {
+        nameless = signals;
+    } else {
+        let not_used = signals.into_iter().map(|(force, _, why)| (force.path, why));
+        scan.not_used.extend(not_used);
+    }
     take_nameless(&mut scan, nameless);
     // Several FRF files in each of several folders: a folder is a posture.
     let mut folders: BTreeMap<String, usize> = BTreeMap::new();
@@ -293,15 +311,45 @@ fn look(name: String, file: &Path) -> Seen {
             path: name,
         });
     }
+    let force = || FoundForce {
+        says_times: true,
+        ..force_of(name.clone(), file)
+    };
     let mut channels = contents.times.iter().flat_map(|t| &t.channels);
     if channels.any(|c| c.role != ChannelRole::Other) {
-        return Seen::Force(force_of(name, file));
+        return match electric(&contents.times) {
+            forces if forces.is_empty() => Seen::Force(force()),
+            forces => Seen::Electric(force(), forces),
+        };
     }
-    let why = match contents.times.is_empty() {
-        true => format!("holds {}", contents.describe()),
-        false => without_forces(&contents.times),
+    let cuts = cuts_of(&contents.times);
+    if cuts.len() > 1 {
+        return several(&force(), cuts);
+    }
+    match contents.times.as_slice() {
+        [] => Seen::NotUsed(name, format!("holds {}", contents.describe())),
+        [record] => {
+            let columns: Vec<PlainColumn> = record.channels.iter().map(PlainColumn::of_channel).collect();
+            let why = without_forces(&contents.times);
+            match may_be_forces(&columns) {
+                true => Seen::Signals(force(), columns, why),
+                false => Seen::NotUsed(name, why),
+            }
+        }
+        times => Seen::NotUsed(name, without_forces(times)),
+    }
+}
+
+/// The forces whose values are volts or charges, with their unit.
+fn electric(times: &[TimeRecord]) -> Vec<(NamedForce, String)> {
+    let is_electric = |c: &Channel| {
+        unit_of_charge_or_other(&c.file_unit).is_some_and(|u| u.dimension == Dimension::VOLTAGE)
     };
-    Seen::NotUsed(name, why)
+    let with_unit = |(what, name): NamedForce| {
+        let channel = times.iter().flat_map(|t| &t.channels).find(|c| c.name == name)?;
+        is_electric(channel).then(|| ((what, name), channel.file_unit.clone()))
+    };
+    forces_of(times).into_iter().filter_map(with_unit).collect()
 }
 
 /// A time record whose channels are called otherwise than forces: what it may be, and what to do then.
@@ -337,6 +385,7 @@ fn force_of(name: String, file: &Path) -> FoundForce {
         from_header: header(file),
         path: name,
         part: None,
+        says_times: false,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::answers::Answers;
-use super::channels::{channels, channels_of_cuts, timeless};
+use super::channels::{channels, channels_of_cuts, electric, timeless};
 use super::entry::{DraftTable, Entry, Kind};
 use super::found::{FoundFrf, Scan, cut_ids};
 use super::list_columns::{CUTTING_SPEED, DIAMETER, DIRECTION, FEED_PER_TURN, FEED_RATE, RADIAL_DEPTH};
@@ -33,8 +33,13 @@ pub fn of(scan: &Scan, answers: &Answers) -> Result<Vec<DraftTable>> {
         let cuts = cuts(scan, answers)?;
         tables.push(tool(&cuts, answers)?);
         tables.push(dynamometer(answers)?);
-        tables.extend(channels(&scan.columns, answers)?);
+        tables.extend(channels(
+            &scan.columns,
+            scan.forces.iter().all(|f| f.says_times),
+            answers,
+        )?);
         tables.extend(timeless(&scan.timeless, answers)?);
+        tables.extend(electric(&scan.electric, answers)?);
         tables.extend(channels_of_cuts(&scan.forces, answers)?);
         tables.extend(cuts.into_iter().map(|(_, table)| table));
     }
@@ -453,15 +458,35 @@ fn rpm_of_speed<'a>(
 }
 
 /// Start and exit angle from the radial depth and the tool's diameter, with why. An edge of the workpiece is taken to be milled,
-/// down where nobody says which way.
+/// down where nobody says which way. A tool with a rounded edge is narrower than its diameter where the cut is shallow.
 fn engagement<'a>(known: &impl Fn(&str) -> Option<&'a str>, answers: &Answers) -> Option<(String, String)> {
     let depth = positive(known(RADIAL_DEPTH)?)?;
     let diameter = positive(answers.get("tool", "", "diameter_mm")?)?;
-    let why = format!("ae {depth} of D {diameter} mm");
-    if depth >= 0.999 * diameter {
+    let corner = match answers.get("tool", "", "kind") {
+        Some("ballend") => 0.5 * diameter,
+        _ => answers
+            .get("tool", "", "corner_radius_mm")
+            .and_then(positive)
+            .unwrap_or(0.0),
+    };
+    let up = known("axial_depth_mm")
+        .and_then(positive)
+        .filter(|up| *up < corner);
+    let width = match up {
+        Some(up) => diameter - 2.0 * corner + 2.0 * (up * (2.0 * corner - up)).sqrt(),
+        None => diameter,
+    };
+    let why = match up {
+        Some(up) => format!(
+            "ae {depth} of D {diameter} mm, {width:.2} mm wide {up} mm above the tip; the wall is taken to be flat: the groove that the \
+             pass before left is none"
+        ),
+        None => format!("ae {depth} of D {diameter} mm"),
+    };
+    if depth >= 0.999 * width {
         return Some(("slot".into(), why));
     }
-    let arc = (1.0 - 2.0 * depth / diameter).acos().to_degrees();
+    let arc = ((width - 2.0 * depth) / diameter).acos().to_degrees();
     Some(match known(DIRECTION) {
         Some("up") => (format!("0 {arc:.3}"), format!("{why}, up milling")),
         Some(_) => (format!("{:.3} 180", 180.0 - arc), format!("{why}, down milling")),

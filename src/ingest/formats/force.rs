@@ -3,7 +3,7 @@
 use crate::InputError;
 use crate::data::{Channel, ChannelRole, TimeRecord};
 use crate::ingest::checks;
-use crate::ingest::tables::channel_names::{self, role_of, split_unit, unit_label};
+use crate::ingest::tables::channel_names::{self, force_without_gain, role_of, split_unit, unit_label};
 use crate::ingest::tables::clock;
 use crate::ingest::tables::number;
 use crate::ingest::tables::table::{Header, Table};
@@ -384,21 +384,15 @@ fn channel(
     let role = role_of(&name, unit);
     let label = header.units.get(at).cloned();
     let file_unit = label.unwrap_or_else(|| unit_label(&name));
-    match unit {
-        Some(unit) => {
-            if (unit.factor - 1.0).abs() > 1e-12 {
-                samples.iter_mut().for_each(|v| *v *= unit.factor);
-            }
-            if unit.dimension == Dimension::VOLTAGE && role != ChannelRole::Other {
-                notes.about(
-                    &name,
-                    "a force in volts: values as they stand, check that they are newtons",
-                );
-            }
-        }
-        None if role == ChannelRole::TorqueZ => notes.about(&name, "no unit that is understood: N·m assumed"),
-        None if role != ChannelRole::Other => notes.about(&name, "no unit that is understood: N assumed"),
-        None => {}
+    match (force_without_gain(role, unit, &file_unit), unit, role) {
+        (Some(told), ..) => notes.about(&name, told),
+        (None, Some(_), _) | (None, None, ChannelRole::Other) => {}
+        (None, None, ChannelRole::TorqueZ) => notes.about(&name, "no unit that is understood: N·m assumed"),
+        (None, None, _) => notes.about(&name, "no unit that is understood: N assumed"),
+    }
+    let factor = unit.map_or(1.0, |u| u.factor);
+    if (factor - 1.0).abs() > 1e-12 {
+        samples.iter_mut().for_each(|v| *v *= factor);
     }
     checks::plausible_samples(&name, &samples).map_err(|e| e.line(header.data_line))?;
     Ok(Channel {

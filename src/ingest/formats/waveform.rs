@@ -1,11 +1,11 @@
 //! Channels of formats that say name, unit and sampling interval of each: made SI, and gathered into records.
 
 use crate::InputError;
-use crate::data::{Channel, ChannelRole, TimeRecord};
+use crate::data::{Channel, TimeRecord};
 use crate::ingest::checks;
-use crate::ingest::tables::channel_names::{role_of, unit_in_name, unit_label};
+use crate::ingest::tables::channel_names::{force_without_gain, role_of, unit_in_name, unit_label};
 use crate::ingest::text::Notes;
-use crate::ingest::units::{self, Dimension};
+use crate::ingest::units;
 
 /// A channel in SI; the unit is read from its label, else from its name (`fx_n`, `Force [N]`).
 ///
@@ -19,24 +19,19 @@ pub(crate) fn channel(
 ) -> Result<Channel, InputError> {
     let unit = units::parse_named(&file_unit).or_else(|| unit_in_name(&name));
     let role = role_of(&name, unit);
-    match unit {
-        None => notes.about(&name, "unit unknown: values as they stand in the file"),
-        Some(unit) if unit.dimension == Dimension::VOLTAGE && role != ChannelRole::Other => {
-            notes.about(
-                &name,
-                "a force in volts: values as they stand, check that they are newtons",
-            );
-        }
-        Some(_) => {}
-    }
-    let factor = unit.map_or(1.0, |u| u.factor);
-    samples.iter_mut().for_each(|v| *v *= factor);
-    checks::plausible_samples(&name, &samples)?;
     let file_unit = if units::is_blank(&file_unit) {
         unit_label(&name)
     } else {
         file_unit
     };
+    match force_without_gain(role, unit, &file_unit) {
+        Some(told) => notes.about(&name, told),
+        None if unit.is_none() => notes.about(&name, "unit unknown: values as they stand in the file"),
+        None => {}
+    }
+    let factor = unit.map_or(1.0, |u| u.factor);
+    samples.iter_mut().for_each(|v| *v *= factor);
+    checks::plausible_samples(&name, &samples)?;
     Ok(Channel {
         name,
         file_unit,

@@ -127,6 +127,26 @@ pub(crate) fn unit_in_name(name: &str) -> Option<Unit> {
     split_unit(name).1
 }
 
+/// What to tell of a force whose values are what the amplifier gave: there is no gain, so that the number of volts (or of what stands in
+/// the file) goes on as that of newtons. `None` for a unit that is a force's, and for what is no force.
+pub(crate) fn force_without_gain(role: ChannelRole, unit: Option<Unit>, label: &str) -> Option<&'static str> {
+    if role == ChannelRole::Other {
+        return None;
+    }
+    let electric = unit.or_else(|| units::unit_of_charge_or_other(label))?;
+    match electric.dimension {
+        Dimension::VOLTAGE if unit.is_none() => Some(
+            "a force as a charge, without a gain: the numbers are taken as newtons; give gain (\"-3.9 pC/N\") in a [[channel]] of \
+             campaign.toml",
+        ),
+        Dimension::VOLTAGE => Some(
+            "a force in volts, without a gain: as many newtons are taken as it has volts; give gain (\"500 N/V\") in a [[channel]] of \
+             campaign.toml",
+        ),
+        _ => None,
+    }
+}
+
 /// The unit that a channel's name gives, as people write it: `m/s²` for `acc_m_per_s2`, `g` for `Acc [g]`; blank where it
 /// gives none.
 pub(crate) fn unit_label(name: &str) -> String {

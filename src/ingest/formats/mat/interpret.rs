@@ -532,7 +532,10 @@ fn quantity(variable: &Variable) -> Option<Quantity> {
     }
 }
 
-/// Real arrays along a time axis, or, where there is only a sampling rate, along the longest dimension there is.
+/// Signals beside one so many times as long are none.
+const SHORT: f64 = 0.25;
+
+/// Real arrays along a time axis, or, where there is only a sampling rate, along their longest dimension.
 fn time_signals(
     variables: &[Variable],
     used: &mut [bool],
@@ -541,8 +544,17 @@ fn time_signals(
     notes: &mut Notes,
 ) -> Result<Vec<TimeRecord>, InputError> {
     let mut records = Vec::new();
-    let mut said = variables.iter().enumerate();
-    let rate = said.find_map(|(k, v)| Some((k, v.says_rate_hz()?)));
+    let rates: Vec<(usize, f64)> = variables
+        .iter()
+        .enumerate()
+        .filter_map(|(k, v)| Some((k, v.says_rate_hz()?)))
+        .collect();
+    let rate = rates.first().copied();
+    // That of its own struct, where each has one.
+    let rate_of = |v: &Variable| {
+        let own = rates.iter().find(|(k, _)| variables[*k].root() == v.root());
+        own.or(rates.first()).map(|r| r.1)
+    };
     let is_time = |v: &Variable| {
         v.im.is_none()
             && v.is_vector()
@@ -592,19 +604,36 @@ fn time_signals(
             used[k] = true;
         }
     }
-    if let (true, Some((_, rate))) = (axes.is_empty(), rate) {
+    let only_rates = axes.is_empty();
+    if only_rates {
         let free = variables
             .iter()
             .zip(used.iter())
             .filter(|(v, u)| !**u && v.im.is_none());
-        let longest = free.flat_map(|(v, _)| v.size.iter().copied()).max();
-        axes.extend(longest.filter(|n| *n >= MIN_AXIS).map(|n| (n, rate, 0.0, None)));
+        let lengths: Vec<(usize, f64)> = free
+            .filter_map(|(v, _)| Some((v.size.iter().copied().max()?, rate_of(v)?)))
+            .collect();
+        // Several cuts in one file are of several lengths; what is far shorter than they are is no record.
+        let longest = lengths.iter().map(|l| l.0).max().unwrap_or(0);
+        for (length, rate) in lengths {
+            let is_known = axes.iter().any(|a| (a.0, a.1) == (length, rate));
+            if length >= MIN_AXIS.max((SHORT * longest as f64) as usize) && !is_known {
+                axes.push((length, rate, 0.0, None));
+            }
+        }
+        axes.sort_by_key(|a| std::cmp::Reverse(a.0));
     }
-    if let Some((k, _)) = rate.filter(|_| !axes.is_empty()) {
-        used[k] = true;
+    if !axes.is_empty() {
+        rates
+            .iter()
+            .take(if only_rates { usize::MAX } else { 1 })
+            .for_each(|(k, _)| used[*k] = true);
     }
     for (length, rate, start_s, uneven) in axes {
         for (k, variable) in variables.iter().enumerate() {
+            if only_rates && rate_of(variable) != Some(rate) {
+                continue;
+            }
             if used[k] || variable.im.is_some() || variable.re.iter().any(|x| !x.is_finite()) {
                 continue;
             }

@@ -13,6 +13,9 @@ pub struct Settings {
     /// Highest order of the stabilisation diagram: poles sought in all FRFs together; from the number of peaks where `None`.
     /// What the lines determine (a third of them) is never exceeded.
     pub max_order: Option<usize>,
+    /// The modes of each FRF are asked for, and not only as starts of those that all have together: each is fitted as well as it can
+    /// be, however many there are.
+    pub each: bool,
     /// When a pole counts as having stayed from one order to the next.
     pub tolerances: Tolerances,
 }

@@ -201,6 +201,7 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
                 mode.estimates.retain(|e| e.damping_ratio > 0.0);
             }
             modes.modes.retain(|m| !m.estimates.is_empty());
+            modes.leave_out_unknown_errors();
             AnalysedFrf {
                 input,
                 modes,

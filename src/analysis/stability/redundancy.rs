@@ -34,7 +34,8 @@ pub struct RedundancyAnalysis {
     pub elbows: Vec<ElbowChoice>,
 }
 
-/// The best place with the elbow turned by an angle; the recommended one is the deepest of all.
+/// The best place with the elbow turned by an angle; the recommended one is the deepest of those at which the hole keeps its
+/// tolerances (of all where none does).
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct ElbowChoice {
     /// From the posture's own elbow, right-handed about the line from shoulder to wrist.
@@ -43,6 +44,9 @@ pub struct ElbowChoice {
     pub usable_angles: usize,
     /// `None` where no angle can be used.
     pub point: Option<SurfacePoint>,
+    /// Whether the hole keeps its tolerances at an angle at least: that goes before the depth. `None` where the hole is not worked out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hole_in_tolerance: Option<bool>,
     pub chosen: bool,
 }
 
@@ -201,19 +205,19 @@ pub(crate) fn sweep(
             check,
             turned_deg,
         )?;
+        let keeps =
+            |analysis: &RedundancyAnalysis| analysis.hole.as_ref().map(|h| !h.no_angle_is_good_enough());
         elbows.push(ElbowChoice {
             turned_deg,
+            hole_in_tolerance: found.as_ref().and_then(|(analysis, _)| keeps(analysis)),
             usable_angles: found.as_ref().map_or(0, |(_, cases)| cases.len()),
             point: found.as_ref().map(|(analysis, _)| analysis.recommendation.point),
             chosen: false,
         });
         let Some(found) = found else { continue };
         let rank = |(analysis, _): &Found| {
-            let keeps = analysis
-                .hole
-                .as_ref()
-                .is_none_or(|hole| !hole.no_angle_is_good_enough());
-            (keeps, analysis.recommendation.point.depth_mm)
+            let depth_mm = analysis.recommendation.point.depth_mm;
+            (keeps(analysis).unwrap_or(true), depth_mm)
         };
         let is_better = match &best {
             None => true,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::answers::Answers;
 use super::found::{Scan, cut_ids, stem};
-use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, TEETH, column, english, is_down, plain};
+use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, OF_TOOL, column, english, is_down, plain};
 use crate::campaign::load::CUT;
 use crate::ingest::sheet_text;
 use crate::text::{closest, shown_briefly as shown};
@@ -155,7 +155,8 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             // An empty row, or one of units.
             continue;
         }
-        let Some(at) = record_named(&name, scan) else {
+        let found = cut_in_file(&rows, row, naming, &ids, scan);
+        let Some(at) = found.or_else(|| record_named(&name, scan)) else {
             return Err(wrong(
                 format!(
                     "{:?} names no force record of the folder, or several",
@@ -180,12 +181,19 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
                 "file" => (),
                 "start_deg" => angles[0] = Some(value.replace(',', ".")),
                 "exit_deg" => angles[1] = Some(value.replace(',', ".")),
-                TEETH => of_tool.take(TEETH, value),
                 DIAMETER => {
                     // In turning it is the workpiece's.
                     answers.set(&table, DIAMETER, value.clone());
                     of_tool.take(DIAMETER, value);
                 }
+                key if OF_TOOL.contains(&key) => of_tool.take(key, value),
+                "spindle_rpm" => match of_thousands(&value) {
+                    Some(rpm) => {
+                        passed_over.push(format!("{:?} read as {rpm} rpm", shown(&value)));
+                        answers.set(&table, *key, rpm);
+                    }
+                    None => answers.set(&table, *key, value),
+                },
                 DIRECTION => match is_down(&value) {
                     Some(down) => answers.set(&table, DIRECTION, if down { "down" } else { "up" }),
                     None => {
@@ -241,7 +249,7 @@ impl OfTool {
 
     fn hand_over(self, answers: &mut Answers, turned: bool) -> Vec<String> {
         let mut told = Vec::new();
-        for key in [DIAMETER, TEETH] {
+        for key in OF_TOOL {
             let values: Vec<&String> = self.0.iter().filter(|(k, _)| *k == key).map(|(_, v)| v).collect();
             match values.as_slice() {
                 [] => (),
@@ -265,6 +273,43 @@ fn scaled(value: &str, factor: f64) -> String {
     }
 }
 
+/// `12.000` or `12,000` as a spindle speed: a mark of thousands, where it would be slower than a hundred turns a minute.
+fn of_thousands(value: &str) -> Option<String> {
+    const SLOWEST_RPM: f64 = 100.0;
+    let (front, back) = value.split_once(['.', ','])?;
+    let all_digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
+    let is_slow = front
+        .parse::<f64>()
+        .is_ok_and(|rpm| (1.0..SLOWEST_RPM).contains(&rpm));
+    (is_slow && all_digits(front) && back.len() == 3 && all_digits(back)).then(|| format!("{front}{back}"))
+}
+
+/// Index of the record that a row means where its file holds several cuts: the one whose id a cell of the row says; where none does and
+/// the list has a row for each of them, in their order.
+fn cut_in_file(
+    rows: &[csv::StringRecord],
+    row: &csv::StringRecord,
+    naming: usize,
+    ids: &[String],
+    scan: &Scan,
+) -> Option<usize> {
+    let name = &row[naming];
+    let is_its = |path: &str| path == name || path.rsplit('/').next() == Some(name) || stem(path) == name;
+    let forces = scan.forces.iter().enumerate();
+    let cuts: Vec<usize> = forces
+        .filter(|(_, f)| f.part.is_some() && is_its(&f.path))
+        .map(|(at, _)| at)
+        .collect();
+    let mut cells = row.iter().enumerate().filter(|(i, _)| *i != naming);
+    let said = cells.find_map(|(_, cell)| cuts.iter().copied().find(|at| ids[*at] == cell));
+    let alike: Vec<&csv::StringRecord> = rows.iter().filter(|other| &other[naming] == name).collect();
+    let place = alike.iter().position(|other| other.position() == row.position());
+    let in_order = place
+        .filter(|_| alike.len() == cuts.len())
+        .map(|place| cuts[place]);
+    said.or(in_order)
+}
+
 /// Index of the force record that a row's name means: its path, its name, the name written a little differently, or its number.
 fn record_named(name: &str, scan: &Scan) -> Option<usize> {
     let letters = |text: &str| -> String { plain(text).chars().filter(|c| c.is_alphanumeric()).collect() };
@@ -285,4 +330,20 @@ fn record_named(name: &str, scan: &Scan) -> Option<usize> {
             _ => None,
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mark_of_thousands_is_none_of_decimals() {
+        for (written, rpm) in [("12.000", "12000"), ("8,500", "8500"), ("1.200", "1200")] {
+            assert_eq!(of_thousands(written).as_deref(), Some(rpm), "{written}");
+        }
+        // So many turns a minute are slow enough, and so few are not written with three digits of them.
+        for written in ["955.000", "1200.5", "12.00", "0.500", "3000", "1.2000", "a.000"] {
+            assert_eq!(of_thousands(written), None, "{written}");
+        }
+    }
 }

@@ -7,6 +7,10 @@ pub(super) const RADIAL_DEPTH: &str = "radial_depth_mm";
 pub(super) const DIRECTION: &str = "direction";
 pub(super) const DIAMETER: &str = "diameter_mm";
 pub(super) const TEETH: &str = "teeth";
+pub(super) const HELIX: &str = "helix_deg";
+pub(super) const HALF_POINT_ANGLE: &str = "half_point_angle_deg";
+/// Keys of `[tool]`: lists say them in every row.
+pub(super) const OF_TOOL: [&str; 4] = [DIAMETER, TEETH, HELIX, HALF_POINT_ANGLE];
 pub(super) const CUTTING_SPEED: &str = "cutting_speed_m_per_min";
 /// The number of the cut where no column names its file.
 pub(super) const NUMBER: &str = "number";
@@ -14,7 +18,7 @@ pub(super) const NUMBER: &str = "number";
 const FEED: &str = "feed";
 
 /// Names in lower case, without accents.
-const NAMES: [(&str, &[&str]); 21] = [
+const NAMES: [(&str, &[&str]); 23] = [
     (
         "file",
         &[
@@ -113,8 +117,10 @@ const NAMES: [(&str, &[&str]); 21] = [
             "zustellung",
             "profondeur axiale",
             "profondeur de passe",
+            "profondeur de passe axiale",
             "profundidad axial",
             "profundidad de corte",
+            "profundidad de corte axial",
             "profundidad de pasada",
         ],
     ),
@@ -131,7 +137,9 @@ const NAMES: [(&str, &[&str]); 21] = [
             "engagement radial",
             "profondeur radiale",
             "largeur de coupe",
+            "largeur de passe",
             "ancho de corte",
+            "profundidad de corte radial",
             "profundidad radial",
         ],
     ),
@@ -195,6 +203,9 @@ const NAMES: [(&str, &[&str]); 21] = [
             "pilot hole",
             "vorbohrung",
             "pilotbohrung",
+            "vorbohrdurchmesser",
+            "pilot diameter",
+            "diametre de l'avant-trou",
             "avant-trou",
             "agujero previo",
         ],
@@ -234,7 +245,11 @@ const NAMES: [(&str, &[&str]); 21] = [
             "durchmesser",
             "werkzeugdurchmesser",
             "diametre",
+            "diametre de l'outil",
+            "diametre outil",
             "diametro",
+            "diametro de la herramienta",
+            "diametro herramienta",
         ],
     ),
     (
@@ -248,8 +263,34 @@ const NAMES: [(&str, &[&str]); 21] = [
             "zaehnezahl",
             "dents",
             "nombre de dents",
+            "nb de dents",
+            "nb dents",
             "dientes",
             "numero de dientes",
+            "n.º dientes",
+            "nº dientes",
+            "no. of teeth",
+        ],
+    ),
+    (
+        HELIX,
+        &[
+            "helix",
+            "helix angle",
+            "drall",
+            "drallwinkel",
+            "spiralwinkel",
+            "angle d'helice",
+            "angulo de helice",
+        ],
+    ),
+    (
+        HALF_POINT_ANGLE,
+        &[
+            "point angle",
+            "spitzenwinkel",
+            "angle de pointe",
+            "angulo de punta",
         ],
     ),
 ];
@@ -278,7 +319,7 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
     let name = plain(name);
     let spaced = name.replace('_', " ");
     let named = |(key, names): &(&'static str, &[&str])| names.contains(&spaced.as_str()).then_some(*key);
-    let own = keys.iter().find(|k| **k == name).copied();
+    let own = keys.iter().chain(&OF_TOOL).find(|k| **k == name).copied();
     let key_of = |spaced: &str| {
         NAMES
             .iter()
@@ -346,19 +387,20 @@ pub(super) fn column(head: &str, keys: &[&'static str]) -> Result<Option<Column>
         FEED if is(&per_tooth) => ("feed_per_tooth_mm", 1.0),
         FEED | FEED_PER_TURN if is(&per_turn) || unit.is_empty() => (FEED_PER_TURN, 1.0),
         "feed_per_tooth_mm" if is(&per_tooth) => (key, 1.0),
-        "start_deg" | "exit_deg" => {
+        "start_deg" | "exit_deg" | HELIX | HALF_POINT_ANGLE => {
             let degrees = 180.0 / std::f64::consts::PI;
-            (
-                key,
-                factor(&[
-                    ("", 1.0),
-                    ("°", 1.0),
-                    ("deg", 1.0),
-                    ("grad", 1.0),
-                    ("degre", 1.0),
-                    ("rad", degrees),
-                ])?,
-            )
+            let factor = factor(&[
+                ("", 1.0),
+                ("°", 1.0),
+                ("deg", 1.0),
+                ("grad", 1.0),
+                ("degre", 1.0),
+                ("grados", 1.0),
+                ("rad", degrees),
+            ])?;
+            // A drill's point is named by the whole angle; who writes our key means the half.
+            let is_whole = key == HALF_POINT_ANGLE && own.is_none();
+            (key, if is_whole { 0.5 * factor } else { factor })
         }
         FEED => return Err(format!("unit {unit:?} of column {name:?} is not understood")),
         CUTTING_SPEED => (
@@ -486,6 +528,10 @@ mod tests {
             ("Profundidad de corte", "axial_depth_mm", 1.0),
             ("Eintritt [°]", "start_deg", 1.0),
             ("Ángulo de salida (rad)", "exit_deg", 180.0 / std::f64::consts::PI),
+            ("Drallwinkel [°]", HELIX, 1.0),
+            ("Spitzenwinkel [°]", HALF_POINT_ANGLE, 0.5),
+            ("half_point_angle_deg", HALF_POINT_ANGLE, 1.0),
+            ("N.º dientes", TEETH, 1.0),
             ("Zähnezahl", TEETH, 1.0),
             ("vc [m/min]", CUTTING_SPEED, 1.0),
             ("f [mm/U]", FEED_PER_TURN, 1.0),

@@ -278,7 +278,12 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTabl
             let found = said(key).into_iter().find_map(|(value, _)| value);
             answers.get("cut", &id, key).or(found)
         };
-        let feeds = Feeds::of(&known, answers);
+        let diameter = known(DIAMETER)
+            .or_else(|| answers.get("tool", "", DIAMETER))
+            .map(str::to_string);
+        let from_speed = rpm_of_speed(&known, diameter.as_deref());
+        let rpm = known("spindle_rpm").or(from_speed.as_ref().map(|(rpm, _)| rpm.as_str()));
+        let feeds = Feeds::of(&known, rpm.and_then(positive), answers);
         let engaged = engagement(&known, answers);
         // A key that only one process has tells the process.
         let drilled = [
@@ -319,11 +324,7 @@ fn cuts(scan: &Scan, answers: &Answers) -> Result<Vec<(Option<String>, DraftTabl
         )?;
         let process = making.table.entries.last().and_then(Entry::value_text);
         let process = process.map(|p| p.trim_matches('"').to_string());
-        let diameter = known(DIAMETER)
-            .or_else(|| answers.get("tool", "", DIAMETER))
-            .map(str::to_string);
         let [header, name] = said("spindle_rpm");
-        let from_speed = rpm_of_speed(&known, diameter.as_deref());
         let derived = from_speed
             .as_ref()
             .map_or((None, ""), |(rpm, why)| (Some(rpm.as_str()), why.as_str()));
@@ -415,11 +416,11 @@ struct Feeds {
 }
 
 impl Feeds {
-    /// From a feed rate or a feed per turn, the speed, and the number of teeth.
-    fn of<'a>(known: &impl Fn(&str) -> Option<&'a str>, answers: &Answers) -> Feeds {
+    /// From a feed rate or a feed per turn, the spindle speed, rpm, and the number of teeth.
+    fn of<'a>(known: &impl Fn(&str) -> Option<&'a str>, rpm: Option<f64>, answers: &Answers) -> Feeds {
         let number = |key: &str| positive(known(key)?);
         let teeth = answers.get("tool", "", "teeth").and_then(positive);
-        let (per_turn, why) = match (number(FEED_RATE), number("spindle_rpm"), number(FEED_PER_TURN)) {
+        let (per_turn, why) = match (number(FEED_RATE), rpm, number(FEED_PER_TURN)) {
             (Some(rate), Some(rpm), _) => (Some(rate / rpm), format!("{rate} mm/min at {rpm} rpm")),
             (_, _, Some(feed)) => (Some(feed), format!("{feed} mm per turn")),
             // In milling, `f0.2` in a name is per turn too.

@@ -74,32 +74,68 @@ fn redundancy_text(found: &RedundancyAnalysis) -> String {
     sweep + &elbows_text(found)
 }
 
+/// Nearer to a joint's limit a posture is worth a word, °.
+const NEAR_A_LIMIT_DEG: f64 = 3.0;
+
 fn elbows_text(found: &RedundancyAnalysis) -> String {
     if found.elbows.is_empty() {
         return String::new();
     }
+    let or_none = |v: Option<String>| v.unwrap_or("–".into());
+    let with_hole = found.elbows.iter().any(|e| e.hole_in_tolerance.is_some());
     let rows: Vec<Vec<String>> = found
         .elbows
         .iter()
         .map(|elbow| {
-            let or_none = |v: Option<String>| v.unwrap_or("–".into());
-            vec![
+            let hole = elbow
+                .hole_in_tolerance
+                .map(|keeps| if keeps { "in" } else { "out" });
+            let mut row = vec![
                 format!("{}°", elbow.turned_deg),
                 elbow.usable_angles.to_string(),
                 or_none(elbow.point.map(|p| format!("{:.4}", p.depth_mm))),
                 or_none(elbow.point.map(|p| format!("{:.1}", p.spindle_rpm))),
                 or_none(elbow.point.map(|p| format!("{:.1}°", p.angle_deg))),
-                if elbow.chosen {
-                    "chosen".into()
-                } else {
-                    String::new()
-                },
-            ]
+            ];
+            row.extend(with_hole.then(|| or_none(hole.map(str::to_string))));
+            row.push(if elbow.chosen {
+                "chosen".into()
+            } else {
+                String::new()
+            });
+            row
         })
         .collect();
-    let header = ["elbow turned by", "usable angles", "depth mm", "rpm", "angle", ""];
+    let mut header = vec!["elbow turned by", "usable angles", "depth mm", "rpm", "angle"];
+    header.extend(with_hole.then_some("hole"));
+    header.push("");
+    let hole_decides = with_hole && {
+        let chosen = found.elbows.iter().find(|e| e.chosen).and_then(|e| e.point);
+        let deepest_mm = found
+            .elbows
+            .iter()
+            .filter_map(|e| e.point)
+            .map(|p| p.depth_mm)
+            .fold(0.0, f64::max);
+        chosen.is_some_and(|p| p.depth_mm < deepest_mm)
+    };
+    let why = match hole_decides {
+        true => "Deeper limits are passed over where the hole leaves its tolerances\n",
+        false => "",
+    };
+    let near = found
+        .recommendation
+        .posture
+        .limit_margin_deg
+        .filter(|margin| *margin < NEAR_A_LIMIT_DEG);
+    let near = near.map_or(String::new(), |margin| {
+        format!(
+            "A joint stands {margin:.1}° from its limit there: the robot may refuse the approach; try the next elbow, or forbid these angles \
+             with forbidden_deg\n"
+        )
+    });
     format!(
-        "\nElbow turned with the tool at rest\n{}",
+        "\nElbow turned with the tool at rest\n{}{why}{near}",
         table(&header, &rows).trim_start_matches('\n')
     )
 }

@@ -35,7 +35,7 @@ pub struct ModalArgs {
     /// What the FRFs are of files that do not say (left out: what the other files say, else receptance).
     #[arg(long, value_enum, conflicts_with = "output_only")]
     quantity: Option<Quantity>,
-    /// Print the modes of every single FRF, however many there are.
+    /// Print the modes of every single FRF, each fitted by itself with its errors, however many there are.
     #[arg(long)]
     each: bool,
     /// Tap tests: how FRFs are averaged.
@@ -169,6 +169,7 @@ pub fn run(args: ModalArgs) -> Result<Outcome> {
     let settings = Settings {
         band_hz: args.band,
         max_order: args.order.map(|n| n as usize),
+        each: args.each,
         tolerances: args.tolerances,
     };
     let taps = TapSettings {

@@ -76,7 +76,7 @@ const SAME_WIDTHS: f64 = 0.1;
 const FINE_LINES: f64 = 3.0;
 
 /// Finds the modes of each of many FRFs: [`analyse_frf`], with less effort on each where there are more than twelve, or more
-/// than 60,000 lines in at least four.
+/// than 60,000 lines in at least four ([`FrfModes::brief`]), unless those of each are asked for.
 ///
 /// # Errors
 /// As [`analyse_frf`].
@@ -87,7 +87,7 @@ where
 {
     let lines = || frfs.iter().map(|(f, _)| f.as_ref().len()).sum::<usize>();
     let many = frfs.len() > MANY_FRFS || (frfs.len() >= SET && lines() > MANY_LINES);
-    let effort = if many { BRIEF } else { FULL };
+    let effort = if many && !settings.each { BRIEF } else { FULL };
     let ready: Vec<Ready> = frfs
         .par_iter()
         .map(|(f, h)| Ready::new(f.as_ref(), h.as_ref(), settings))
@@ -259,6 +259,7 @@ fn analyse(ready: Ready, conjugated: bool, effort: Effort) -> FrfModes {
         }
     }
     settle(&curve, &mut found, &noise_std, effort);
+    result.brief = effort.windows.len() < FULL.windows.len();
     result.modes = found.into_iter().map(|f| f.mode).collect();
     result
         .modes

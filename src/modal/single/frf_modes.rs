@@ -111,6 +111,9 @@ pub struct FrfModes {
     /// Peaks whose lines determine no mode: a ripple of a line or two, a pole that could be anywhere. Other FRFs of the set may
     /// say what they are; the remarks name them. Ascending in frequency.
     pub undetermined: Vec<FrfMode>,
+    /// One of many FRFs, fitted with less effort as a start for the modes that all have together: the errors of its modes leave out what
+    /// neighbours do to them.
+    pub brief: bool,
     /// The FRF was recorded with the sign convention e^{−iωt} and was turned before the analysis.
     pub conjugated: bool,
     /// What changes the result.
@@ -120,6 +123,23 @@ pub struct FrfModes {
 }
 
 impl FrfModes {
+    /// Leaves out the errors that a brief fit does not know, and says where they are to be had.
+    pub(crate) fn leave_out_unknown_errors(&mut self) {
+        if !self.brief {
+            return;
+        }
+        for mode in &mut self.modes {
+            for estimate in &mut mode.estimates {
+                (estimate.frequency_std_hz, estimate.damping_std) = (None, None);
+                (estimate.frequency_bias_hz, estimate.damping_bias) = (None, None);
+            }
+            mode.recommended = mode.best().method;
+            mode.reason = "one of many FRFs, fitted briefly as a start for all of them together, whose modes are to be taken; --each fits \
+                           every FRF by itself, with errors"
+                .into();
+        }
+    }
+
     /// The modes and the peaks that may be some: what an analysis together with other FRFs begins with.
     pub(crate) fn peaks(&self) -> impl Iterator<Item = &FrfMode> {
         self.modes.iter().chain(&self.undetermined)

@@ -31,6 +31,9 @@ pub struct Baseline {
     pub young_pa: Option<Dual>,
 }
 
+/// A common Young's modulus beyond that of any material says that no link bends, those with a modulus of their own included.
+pub const NOTHING_BENDS_PA: f64 = 2e13;
+
 /// Damping ratio a model starts from when nothing else is given.
 pub const NOMINAL_DAMPING_RATIO: f64 = 0.03;
 
@@ -134,7 +137,8 @@ impl RobotModel {
         }
     }
 
-    /// The two beam halves of link `i`; none where the link has no section or no length.
+    /// The two beam halves of link `i`; none where the link has no section or no length. `young`: the common modulus, of links that have
+    /// no modulus of their own.
     pub fn link_halves(&self, kinematics: &Kinematics, i: usize, young: &Dual) -> Vec<Element> {
         let (start, end) = kinematics.link_ends(i);
         let length_m = (end - start).norm();
@@ -143,10 +147,17 @@ impl RobotModel {
         };
         let middle = nalgebra::center(&start, &end);
         let shape = beam::tip_stiffness_per_pa(&section, 0.5 * length_m);
+        let height_axis = section.shape.height_axis();
+        let height_axis = height_axis.map(|axis| kinematics.link_rotation(i) * Vector3::from(axis));
+        let young = match section.young_pa {
+            Some(own) if young.value > NOTHING_BENDS_PA => young.scale(own / NOTHING_BENDS_PA),
+            Some(own) => Dual::constant(own),
+            None => young.clone(),
+        };
         [(start, middle, Slot::FirstHalf), (middle, end, Slot::SecondHalf)]
             .into_iter()
             .map(|(from, to, slot)| {
-                let rotation = beam::tip_frame(from, to).rotation.to_rotation_matrix();
+                let rotation = beam::tip_frame(from, to, height_axis).rotation.to_rotation_matrix();
                 let directions = (0..6)
                     .map(|k| {
                         let axis = rotation.matrix().column(k % 3).into_owned();
@@ -314,10 +325,7 @@ mod tests {
     /// compliance L³/3EI exactly, whatever the number of links.
     #[test]
     fn straight_chain_of_beams_is_a_cantilever() {
-        let section = BeamSection {
-            outer_diameter_m: 0.1,
-            wall_m: 0.01,
-        };
+        let section = BeamSection::tube(0.1, 0.01);
         let count = 4;
         let spec = RobotSpec {
             name: "straight".into(),
@@ -351,10 +359,11 @@ mod tests {
         baseline.young_pa = Some(Dual::constant(young));
         let chain = model.chain(&kinematics, &baseline);
         let c = chain.compliance(kinematics.tcp(), model.flange_place()).unwrap();
-        let (l, i) = (2.0f64, section.second_moment_m4());
+        let stiffness = section.shape.stiffness();
+        let (l, i) = (2.0f64, stiffness.about_y_m4);
         assert_relative_eq!(c[(1, 1)], l.powi(3) / (3.0 * young * i), max_relative = 1e-6);
         assert_relative_eq!(c[(2, 2)], l.powi(3) / (3.0 * young * i), max_relative = 1e-6);
-        assert_relative_eq!(c[(0, 0)], l / (young * section.area_m2()), max_relative = 1e-6);
+        assert_relative_eq!(c[(0, 0)], l / (young * stiffness.area_m2), max_relative = 1e-6);
         assert_relative_eq!(c[(5, 1)], l.powi(2) / (2.0 * young * i), max_relative = 1e-6);
     }
 

@@ -1,7 +1,7 @@
 //! Robots from URDF files (the robot description of ROS) and back.
 //!
-//! A URDF has geometry and rigid bodies. It has no compliances and no damping: those of a robot that is read here are
-//! guesses, said to be guesses in the robot file ([`guess`]).
+//! A URDF has geometry and rigid bodies. It has no compliances and no damping: those of a robot that is read here are from the file
+//! next to it ([`BesideUrdf`]), else guesses, said to be guesses in the robot file ([`guess`]).
 
 mod body;
 pub mod guess;
@@ -10,6 +10,7 @@ mod tree;
 mod write;
 
 pub use read::{Request, UrdfRobot, read};
+pub use crate::campaign::beside_urdf::{BesideUrdf, SaidBeside, beside};
 pub use write::{Sources, compliances, urdf};
 
 #[cfg(test)]
@@ -70,7 +71,7 @@ mod tests {
         for text in FILES {
             let found = robot(text).unwrap();
             let folder = tempfile::tempdir().unwrap();
-            std::fs::write(folder.path().join("arm.toml"), found.spec.to_toml(&found.notes)).unwrap();
+            std::fs::write(folder.path().join("arm.toml"), found.spec.to_toml(&Default::default())).unwrap();
             let back = crate::data::RobotSpec::load("arm.toml", folder.path()).unwrap();
             assert_eq!(
                 (&back.name, &back.guesses),

@@ -71,7 +71,11 @@ impl BesideUrdf {
     /// # Errors
     /// A broken file, and one that knows a joint of the robot not at all or twice; with file, line, key and remedy.
     pub fn apply(&self, urdf: &Path, spec: &mut RobotSpec) -> Result<SaidBeside> {
-        let name_of = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name_of = |path: &Path| {
+            path.file_name()
+                .map(|n| n.to_string_lossy().into_owned())
+                .unwrap_or_default()
+        };
         self.document.parse(&TOP, |top| {
             let joints = by_name(top, "joint", &JOINT)?;
             for joint in &mut spec.joints {
@@ -122,7 +126,9 @@ fn by_name<'d>(top: &Section<'d>, key: &str, keys: &[&str]) -> Result<HashMap<St
     let mut all = HashMap::new();
     for table in top.sections(key, keys)? {
         let name = table.text("name")?;
-        let name = name.ok_or_else(|| table.error("name", "missing").remedy(REMEDY))?.to_string();
+        let name = name
+            .ok_or_else(|| table.error("name", "missing").remedy(REMEDY))?
+            .to_string();
         if all.contains_key(&name) {
             let problem = format!("{name:?} is there twice");
             return Err(table.error("name", problem).remedy(REMEDY).into());

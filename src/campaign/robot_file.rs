@@ -8,9 +8,7 @@ use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
-use crate::data::{
-    BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, SectionShape, ToolFrame,
-};
+use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, SectionShape, ToolFrame};
 use crate::text::closest;
 use crate::{InputError, Result};
 
@@ -281,7 +279,10 @@ pub(super) fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
     let (one, other) = (given.next(), given.next());
     if let (Some(one), Some(other)) = (one, other) {
         return Err(link
-            .error(other, format!("given together with {one}: the link has two sections"))
+            .error(
+                other,
+                format!("given together with {one}: the link has two sections"),
+            )
             .remedy("keep one of them: a round tube, a rectangular tube, or area and second moments")
             .into());
     }
@@ -402,11 +403,7 @@ mod tests {
         let mass: f64 = robot.links.iter().map(|l| l.mass_kg).sum();
         assert_relative_eq!(mass, 1119.37979083, epsilon = 1e-8);
         // Sections as datasets/irb6640/robot.toml estimates them: link 5 has no length and stays rigid.
-        let sections: Vec<_> = robot
-            .links
-            .iter()
-            .map(|l| l.section)
-            .collect();
+        let sections: Vec<_> = robot.links.iter().map(|l| l.section).collect();
         assert_eq!(sections[0], Some(BeamSection::tube(0.45, 0.03)));
         assert_eq!(sections[3], Some(BeamSection::tube(0.24, 0.018)));
         assert_eq!(sections[4], None);
@@ -434,15 +431,21 @@ mod tests {
                 "link[0].section_wall_m: is 0.06",
             ),
             (
-                format!("{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_area_m2 = 1\n"),
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_area_m2 = 1\n"
+                ),
                 "robot.toml:11: link[0].section_area_m2: given together with section_outer_diameter_m: the link has two sections",
             ),
             (
-                format!("{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.06\n"),
+                format!(
+                    "{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.06\n"
+                ),
                 "link[0].section_wall_m: is 0.06",
             ),
             (
-                format!("{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.05\n"),
+                format!(
+                    "{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.05\n"
+                ),
                 "link[0].section_height_axis: missing",
             ),
             (
@@ -458,11 +461,15 @@ mod tests {
                 "link[0].young_pa: given without a section",
             ),
             (
-                format!("{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nshear_pa = 3e10\n"),
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nshear_pa = 3e10\n"
+                ),
                 "link[0].shear_pa: given without young_pa",
             ),
             (
-                format!("{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_height_axis = [0, 1, 0]\n"),
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_height_axis = [0, 1, 0]\n"
+                ),
                 "link[0].section_height_axis: given without a section that is not round",
             ),
             (

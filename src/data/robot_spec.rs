@@ -1,5 +1,7 @@
 //! What a robot file says: geometry, masses, compliances. (The form of `datasets/irb6640/robot.toml`.)
 
+use crate::text::{listed, to_degrees};
+
 /// A serial robot with revolute joints. A joint is given either in the standard (distal) Denavit–Hartenberg convention,
 /// T_i = Rz(q_i + offset) Tz(d) Tx(a) Rx(alpha), and turns about z of frame i−1; or by its [`JointPlacement`], and turns
 /// about any axis. Link i is fixed to frame i.
@@ -18,6 +20,20 @@ pub struct RobotSpec {
 }
 
 impl RobotSpec {
+    /// Which joints stand beyond their limits at a posture, as a sentence's end: `joint 2 at 500° (limits -115 to 143°)`; `None`: no joint.
+    pub fn beyond_limits(&self, joints_deg: &[f64]) -> Option<String> {
+        /// Rounding, degrees.
+        const ROUNDING: f64 = 1e-6;
+        let joints = self.joints.iter().zip(joints_deg).enumerate();
+        let beyond = joints.filter_map(|(i, (joint, at))| {
+            let [low, high] = joint.limits_rad?.map(to_degrees);
+            let inside = (low - ROUNDING..=high + ROUNDING).contains(at);
+            (!inside).then(|| format!("joint {} at {at}° (limits {low} to {high}°)", i + 1))
+        });
+        let beyond: Vec<String> = beyond.collect();
+        (!beyond.is_empty()).then(|| listed(&beyond))
+    }
+
     /// Whether one of the guesses is about the joints' compliances.
     pub fn compliances_are_guessed(&self) -> bool {
         self.guesses.iter().any(|guess| is_of_compliances(guess))
@@ -165,9 +181,7 @@ impl SectionShape {
     /// Wall thickness of the solid section; `None` as for [`wall_m`](Self::wall_m).
     pub fn thickest_wall_m(&self) -> Option<f64> {
         match self {
-            SectionShape::Tube {
-                outer_diameter_m, ..
-            } => Some(0.5 * outer_diameter_m),
+            SectionShape::Tube { outer_diameter_m, .. } => Some(0.5 * outer_diameter_m),
             SectionShape::Box {
                 width_m, height_m, ..
             } => Some(0.5 * width_m.min(*height_m)),

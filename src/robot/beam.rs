@@ -180,11 +180,22 @@ mod tests {
         }
         .stiffness();
         let (area, round) = (0.199 * 0.299, 2.0 * (0.199 + 0.299));
-        assert_relative_eq!(thin.torsion_m4, 4.0 * area * area * 1e-3 / round, max_relative = 1e-4);
+        assert_relative_eq!(
+            thin.torsion_m4,
+            4.0 * area * area * 1e-3 / round,
+            max_relative = 1e-4
+        );
         // A round bar is as stiff every way: π d⁴/64, and twice that in torsion.
         let round = BeamSection::tube(0.1, 0.05).shape.stiffness();
-        assert_relative_eq!(round.about_y_m4, std::f64::consts::PI * 1e-4 / 64.0, max_relative = 1e-12);
-        assert_eq!((round.about_y_m4, 2.0 * round.about_y_m4), (round.about_z_m4, round.torsion_m4));
+        assert_relative_eq!(
+            round.about_y_m4,
+            std::f64::consts::PI * 1e-4 / 64.0,
+            max_relative = 1e-12
+        );
+        assert_eq!(
+            (round.about_y_m4, 2.0 * round.about_y_m4),
+            (round.about_z_m4, round.torsion_m4)
+        );
     }
 
     #[test]
@@ -193,7 +204,11 @@ mod tests {
         let frame = tip_frame(Point3::origin(), to, Some(Vector3::new(1.0, 0.0, 2.0)));
         let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| frame.rotation * axis);
         assert_relative_eq!(x, to.coords.normalize(), epsilon = 1e-12);
-        assert_relative_eq!(z, (Vector3::new(1.0, 0.0, 2.0) - x * x.x).normalize(), epsilon = 1e-12);
+        assert_relative_eq!(
+            z,
+            (Vector3::new(1.0, 0.0, 2.0) - x * x.x).normalize(),
+            epsilon = 1e-12
+        );
         assert_relative_eq!(y, z.cross(&x), epsilon = 1e-12);
     }
 }

@@ -137,6 +137,20 @@ impl RobotModel {
         }
     }
 
+    /// The first link whose section is not round and has its height along the link, so that it has no direction.
+    pub fn link_with_lost_section(&self) -> Option<usize> {
+        let kinematics = Kinematics::new(&self.spec, &vec![0.0; self.joint_count()]);
+        (1..=self.joint_count()).find(|i| {
+            let axis = self.spec.links[i - 1].section.and_then(|s| s.shape.height_axis());
+            let (start, end) = kinematics.link_ends(*i);
+            let along = end - start;
+            axis.filter(|_| along.norm() > 1e-9).is_some_and(|axis| {
+                let axis = kinematics.link_rotation(*i) * Vector3::from(axis);
+                axis.normalize().cross(&along.normalize()).norm() <= beam::ACROSS
+            })
+        })
+    }
+
     /// The two beam halves of link `i`; none where the link has no section or no length. `young`: the common modulus, of links that have
     /// no modulus of their own.
     pub fn link_halves(&self, kinematics: &Kinematics, i: usize, young: &Dual) -> Vec<Element> {
@@ -157,7 +171,9 @@ impl RobotModel {
         [(start, middle, Slot::FirstHalf), (middle, end, Slot::SecondHalf)]
             .into_iter()
             .map(|(from, to, slot)| {
-                let rotation = beam::tip_frame(from, to, height_axis).rotation.to_rotation_matrix();
+                let rotation = beam::tip_frame(from, to, height_axis)
+                    .rotation
+                    .to_rotation_matrix();
                 let directions = (0..6)
                     .map(|k| {
                         let axis = rotation.matrix().column(k % 3).into_owned();

@@ -383,12 +383,22 @@ mod tests {
             // One kind of section a link, whole but for the key that is wrong.
             let section = [
                 (
-                    &["section_outer_diameter_m", "section_wall_m", "young_pa", "shear_pa"][..],
+                    &[
+                        "section_outer_diameter_m",
+                        "section_wall_m",
+                        "young_pa",
+                        "shear_pa",
+                    ][..],
                     &["section_outer_diameter_m", "section_wall_m", "young_pa"][..],
                 ),
                 (
                     &["section_width_m", "section_height_m"],
-                    &["section_width_m", "section_height_m", "section_wall_m", "section_height_axis"],
+                    &[
+                        "section_width_m",
+                        "section_height_m",
+                        "section_wall_m",
+                        "section_height_axis",
+                    ],
                 ),
                 (
                     &[

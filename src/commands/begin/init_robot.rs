@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::campaign::robot_text::RobotComments;
 use crate::commands::text::Emphasis;
+use crate::data::RobotSpec;
 use crate::files::{write_atomically, write_new};
 use crate::robot::urdf::{BesideUrdf, Request, UrdfRobot, beside, read};
 use crate::text::listed;
@@ -123,6 +124,11 @@ impl MadeRobot {
         }))
     }
 
+    /// The robot.
+    pub fn spec(&self) -> &RobotSpec {
+        &self.robot.spec
+    }
+
     /// Writes the robot file; whether there was one before.
     ///
     /// # Errors
@@ -168,9 +174,15 @@ impl MadeRobot {
     fn beside(&self) -> Option<String> {
         let said = self.robot.beside.as_ref()?;
         let source = said.source.as_ref().map_or(String::new(), |s| format!(" ({s})"));
-        let mut told = format!("Compliances and sections of links are from {}{source}.", said.file_name);
+        let mut told = format!(
+            "Compliances and sections of links are from {}{source}.",
+            said.file_name
+        );
         if !said.notes.is_empty() {
-            told += &format!(" It also says what a robot file has no place for: {}.", listed(&said.notes));
+            told += &format!(
+                " It also says what a robot file has no place for: {}.",
+                listed(&said.notes)
+            );
         }
         Some(told)
     }

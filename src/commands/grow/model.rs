@@ -13,8 +13,8 @@ use crate::effects::LINK_FLEXIBILITY;
 use crate::files::write_new;
 use crate::identify::{Options, StructureModel};
 use crate::lobes::drilling::contact::held_report;
-use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
+use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::urdf::{self, Sources};
 use crate::robot::{Baseline, Dual, PostureReport, RobotModel, export};
 use crate::{Error, InputError, Result};
@@ -74,7 +74,9 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
             effects: case.effects(),
         });
     } else {
-        notes = model.robot.spec.guesses_told().chain(left_out).collect();
+        let told = campaign.beyond_limits.iter().cloned();
+        let told = told.chain(model.robot.spec.guesses_told());
+        notes = told.chain(left_out).collect();
     }
     text += &warnings(&notes);
     let mut written = None;
@@ -265,6 +267,7 @@ fn postures(
 ) -> Result<Vec<PostureTold>> {
     let mut baseline = model.baseline(theta, false);
     baseline.young_pa = young_pa(model, args)?.map(Dual::constant);
+    let robot = model.robot_as_fitted(theta);
     campaign
         .postures
         .iter()
@@ -272,15 +275,11 @@ fn postures(
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
             let chain =
                 |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, Default::default(), false);
-            let report = PostureReport::new(&model.robot, &kinematics, &chain(&baseline))?;
+            let fitted = robot.kinematics(&posture.joints_deg)?;
+            let report = PostureReport::new(&robot, &fitted, &chain(&baseline))?;
             let held = match campaign.contacts.as_slice() {
                 [] => None,
-                contacts => Some(held_report(
-                    &model.robot,
-                    &kinematics,
-                    &chain(&baseline),
-                    contacts,
-                )?),
+                contacts => Some(held_report(&robot, &fitted, &chain(&baseline), contacts)?),
             };
             let mut matrices = None;
             if args.matrices {
@@ -311,8 +310,8 @@ fn postures(
                 tcp_m: report.tcp_m,
                 tool_axis: report.tool_axis,
                 free: Dynamics::of(report),
-                centre_of_mass_m: model.robot.centre_of_mass(&kinematics).map(|c| [c.x, c.y, c.z]),
-                gravity_torques_nm: model.robot.gravity_torques_nm(&kinematics, down),
+                centre_of_mass_m: robot.centre_of_mass(&fitted).map(|c| [c.x, c.y, c.z]),
+                gravity_torques_nm: robot.gravity_torques_nm(&fitted, down),
                 held: held.map(Dynamics::of),
                 matrices,
             })

@@ -72,7 +72,9 @@ fn file_parameter(robot: &RobotModel, number: FileNumber, tolerance: f64) -> Par
         ),
         FileNumber::Wall { link } => {
             let section = robot.spec.links[link - 1].section;
-            let thickest = section.and_then(|s| s.shape.thickest_wall_m()).unwrap_or(f64::INFINITY);
+            let thickest = section
+                .and_then(|s| s.shape.thickest_wall_m())
+                .unwrap_or(f64::INFINITY);
             // A solid bar has no thicker wall.
             let most = (nominal * WALL_FACTOR).min(0.998 * thickest);
             (Scale::Logarithmic, [nominal / WALL_FACTOR, most.max(nominal)])

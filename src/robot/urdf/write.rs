@@ -194,7 +194,12 @@ pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
                 .with_height_axis((behind_axis(joint).rotation * Vector3::from(axis)).into()),
             ..*section
         };
-        let _ = write!(text, "\n[[link]]\nname = {}\n{}", quoted(name), section_text(&turned));
+        let _ = write!(
+            text,
+            "\n[[link]]\nname = {}\n{}",
+            quoted(name),
+            section_text(&turned)
+        );
     }
     text
 }

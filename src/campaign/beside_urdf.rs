@@ -1,7 +1,7 @@
 //! The file next to a URDF that holds what a URDF has no place for (`lobestone model --urdf` writes it): joint compliances and the
 //! sections of links.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::Result;
@@ -122,8 +122,8 @@ impl BesideUrdf {
 }
 
 /// The tables `[[key]]` by their `name`.
-fn by_name<'d>(top: &Section<'d>, key: &str, keys: &[&str]) -> Result<HashMap<String, Section<'d>>> {
-    let mut all = HashMap::new();
+fn by_name<'d>(top: &Section<'d>, key: &str, keys: &[&str]) -> Result<BTreeMap<String, Section<'d>>> {
+    let mut all = BTreeMap::new();
     for table in top.sections(key, keys)? {
         let name = table.text("name")?;
         let name = name

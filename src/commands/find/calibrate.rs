@@ -180,13 +180,17 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         text += &format!("{sentence}\n");
     }
     text += &warnings_but(notes, &case.warnings);
-    let next = Guide::structure(&campaign).calibrated(
-        calibration.converged(),
-        args.starts,
-        calibration.reduced_chi2,
-        &after.totals,
-        after.mostly.as_ref().map(DominantRegion::words),
-    );
+    let guide = Guide::structure(&campaign);
+    let next = match &freed {
+        Some(freed) if !freed.is_believable() => guide.imitated(),
+        _ => guide.calibrated(
+            calibration.converged(),
+            args.starts,
+            calibration.reduced_chi2,
+            &after.totals,
+            after.mostly.as_ref().map(DominantRegion::words),
+        ),
+    };
     Ok(Outcome::new(document, text, Some(next)))
 }
 
@@ -381,20 +385,19 @@ fn describe_freed(campaign: &Campaign, freed: &FreedLinks, args: &CalibrateArgs)
         );
     }
     if !believable {
-        let ends = freed.at_end_of_range();
+        let ends: Vec<String> = freed.at_end_of_range().into_iter().map(str::to_string).collect();
         let stand = match ends.len() {
             1 => "stands at the end of its range",
             _ => "stand at the end of their range",
         };
-        let ends: Vec<String> = ends.into_iter().map(str::to_string).collect();
-        let bending = match freed.after.case.bends() {
+        let rigid = match freed.after.case.bends() {
             true => "",
-            false => ", or `link-flexibility`, as the links of this model are rigid",
+            false => " (its links are rigid: where the real ones bend, `link-flexibility` is missing)",
         };
         return text
             + &format!(
-                "\nthese values cannot be believed: {} {stand}, and the misfit is still {} times that of noise. Links imitate \
-                 what the model does not have: leave them as they are and run `lobestone diagnose {dir}` for what is missing{bending}\n",
+                "\nthese values cannot be believed: {} {stand}, and the misfit is still {} times that of noise. Links imitate what the model \
+                 does not have{rigid}: leave them as they are, and see what `lobestone diagnose {dir}` finds missing\n",
                 listed(&ends),
                 number(freed.after.calibration.reduced_chi2, 2)
             );

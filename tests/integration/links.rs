@@ -227,6 +227,22 @@ fn nothing_is_freed_that_should_not_be() {
     assert!(run.stdout.contains("agree with the robot file"), "{}", run.stdout);
 }
 
+/// Numbers that predict left-out postures no better may be what the file says, and are not offered to be kept.
+#[test]
+fn what_predicts_nothing_better_is_not_called_wrong() {
+    let dir = blind("frf-9216");
+    let run = lobestone(&["calibrate", dir.to_str().unwrap(), "--free", "links"]);
+    for words in [
+        "fit better with other values than the robot file's",
+        "leave them as they are",
+    ] {
+        assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
+    }
+    for words in ["cannot be what", "--write-robot"] {
+        assert!(!run.stdout.contains(words), "{words}: {}", run.stdout);
+    }
+}
+
 #[test]
 fn walls_of_rigid_links_are_refused() {
     let dir = blind("frf-9112");

@@ -3,8 +3,10 @@
 use super::StructureAnalysis;
 use super::structure_case::Freed;
 use crate::campaign::{Campaign, LinkGroup};
+use crate::data::RobotSpec;
 use crate::discrepancy::verdict::is_progress;
 use crate::identify::departures::departures;
+use crate::identify::frfs::calibrate::FAR_ABOVE_NOISE;
 use crate::identify::levenberg_marquardt::Stopping;
 use crate::identify::study::{Extent, held_out};
 use crate::identify::{Calibration, Estimate, HeldOut, Options, Parameter, StructureCase, Undetermined};
@@ -37,6 +39,32 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 };
 
 impl FreedLinks {
+    /// Names of the departing parameters that stopped at the end of their range.
+    pub fn at_end_of_range(&self) -> Vec<&str> {
+        let stopped = self.departures().filter(|p| p.at_bound);
+        stopped.map(|p| p.name.as_str()).collect()
+    }
+
+    /// Whether the departing values can be those of the links: not where some only stopped at the end of their range and far more than
+    /// noise is left all the same. Links imitate much that the model does not have.
+    pub fn is_believable(&self) -> bool {
+        self.at_end_of_range().is_empty() || self.after.calibration.reduced_chi2 <= FAR_ABOVE_NOISE
+    }
+
+    /// The departing parameters as fitted.
+    pub fn departures(&self) -> impl Iterator<Item = &Estimate> {
+        let fitted = self.after.calibration.parameters.iter();
+        fitted.filter(|p| self.departing.contains(&p.name))
+    }
+
+    /// The robot file's robot with the departing parameters as fitted. Joints, and what the campaign frees itself, stay as in the file:
+    /// a calibration on this robot comes to the same fit.
+    pub fn robot(&self) -> RobotSpec {
+        let (model, theta) = (&self.after.case.model, &self.after.calibration.theta);
+        let departs = |name: &str| self.departing.iter().any(|d| d == name);
+        model.robot_with(theta, departs).spec
+    }
+
     /// Fits `case` with the groups free, finds which of their parameters must differ from the robot file, and fits those alone.
     ///
     /// # Errors

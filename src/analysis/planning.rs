@@ -124,7 +124,7 @@ impl PlanFindings {
             stands = (0..campaign.postures.len()).map(|p| (p, None)).collect();
         }
         stands.dedup();
-        let mut warnings = Vec::new();
+        let mut warnings = campaign.beyond_limits.clone();
         let measured = match there.is_empty() {
             true => None,
             false => {
@@ -133,7 +133,7 @@ impl PlanFindings {
                     ..campaign.clone()
                 };
                 let (set, notes) = present.load_frfs()?;
-                warnings = notes;
+                warnings.extend(notes);
                 Some(frf_data(&present, &model.robot, set)?)
             }
         };

@@ -42,10 +42,19 @@ pub struct Freed<'a> {
 
 fn structure_model_freeing(campaign: &Campaign, freed: &Freed) -> Result<StructureModel> {
     let section = &robot_section(campaign)?.freeing(freed.groups);
-    let spec = RobotSpec::load(&section.model, &campaign.dir)?;
+    let robot = RobotModel::new(RobotSpec::load(&section.model, &campaign.dir)?);
+    if let Some(link) = robot.link_with_lost_section() {
+        return Err(InputError::new("points along the link, so that nobody knows how its section is turned")
+            .file(campaign.dir.join(&section.model))
+            .key(format!("link[{}].section_height_axis", link - 1))
+            .remedy(
+                "give a direction across the straight line from the link's joint to the next one, in the link's frame",
+            )
+            .into());
+    }
     let kept = |name: &str| freed.only.is_none_or(|only| only.iter().any(|o| o == name));
     Ok(StructureModel::freeing(
-        RobotModel::new(spec),
+        robot,
         campaign.points.clone(),
         section,
         kept,
@@ -84,6 +93,7 @@ impl StructureCase {
         let revisions: Vec<Revision> = log.revisions(Side::Structure).cloned().collect();
         let (set, noticed) = campaign.load_frfs()?;
         let mut warnings = Vec::from_iter(campaign.guesses.of_robot_told());
+        warnings.extend(campaign.beyond_limits.iter().cloned());
         warnings.extend(noticed);
         warnings.extend(baseline.robot.spec.guesses_told());
         let data = frf_data(campaign, &baseline.robot, set)?;

@@ -426,6 +426,7 @@ mod tests {
                 id: "p1".into(),
                 joints_deg: vec![0.0],
             }],
+            beyond_limits: vec![],
             points: vec![Point {
                 node: 1,
                 body: BodyRef::Tool,

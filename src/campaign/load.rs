@@ -99,6 +99,10 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
     let robot = robot(dir, top)?;
     let joints = robot.as_ref().map(|(_, spec)| spec.joints.len());
     let postures = postures(top, joints)?;
+    let spec = robot.as_ref().map(|(_, spec)| spec);
+    let beyond_limits = spec.map_or(Vec::new(), |spec| {
+        postures.iter().filter_map(|p| p.beyond_limits(spec)).collect()
+    });
     let points = points(top, joints)?;
     let frfs = frfs(dir, top, &postures, find)?;
     let tool = tool(top)?;
@@ -120,6 +124,7 @@ fn read(dir: &Path, top: &Section<'_>, find: Find) -> Result<Campaign> {
         date: top.text("date")?.map(str::to_string),
         robot: robot.map(|(section, _)| section),
         postures,
+        beyond_limits,
         points,
         frfs,
         tool,

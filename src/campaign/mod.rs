@@ -1,5 +1,6 @@
 //! A campaign folder: what was measured, where, and on what. SI values keep the unit of the file in their name.
 
+pub mod beside_urdf;
 mod channels;
 mod contacts;
 pub mod draft;

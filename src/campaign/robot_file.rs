@@ -8,7 +8,7 @@ use crate::campaign::form::keys::ROBOT_KEY;
 use crate::campaign::form::keys::{self, names};
 use crate::campaign::form::paths::{self, campaign_file};
 use crate::campaign::form::section::Section;
-use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
+use crate::data::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, SectionShape, ToolFrame};
 use crate::text::closest;
 use crate::{InputError, Result};
 
@@ -129,6 +129,25 @@ const WHERE_MASS: &str = "give it from the maker's data, a CAD model or a URDF o
 const WHERE_INERTIA: &str = "give the moments of inertia [Ixx, Iyy, Izz] about the centre of mass from the maker's data, a CAD model or a \
      URDF of the robot";
 const WHERE_SECTION: &str = "measure the link: outer diameter and wall of a hollow round beam like it; without both the link stays rigid";
+const WHERE_BOX: &str = "measure the link: outer width, outer height and wall of a rectangular tube like it";
+const WHERE_GENERAL: &str = "give area, both second moments of area and the torsion constant of the section, from a CAD model or a table of \
+     sections";
+const WHERE_HEIGHT: &str = "give the direction [x, y, z] in the link's frame along which the section's height lies: what is along the link \
+     itself does not count (docs/files.md)";
+
+/// Keys by which a section is given, kind by kind; a wall belongs to both tubes.
+const WALL: &str = "section_wall_m";
+const TUBE: [&str; 1] = ["section_outer_diameter_m"];
+const BOX: [&str; 2] = ["section_width_m", "section_height_m"];
+const GENERAL: [&str; 4] = [
+    "section_area_m2",
+    "section_second_moment_y_m4",
+    "section_second_moment_z_m4",
+    "section_torsion_constant_m4",
+];
+const HEIGHT_AXIS: &str = "section_height_axis";
+const YOUNG: &str = "young_pa";
+const SHEAR: &str = "shear_pa";
 
 /// How a joint is placed where it is not by the Denavit–Hartenberg convention.
 fn placement(joint: &Section<'_>) -> Result<Option<JointPlacement>> {
@@ -252,18 +271,91 @@ fn link(link: &Section<'_>) -> Result<LinkSpec> {
     Ok(read)
 }
 
-fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
-    let (outer, wall) = ("section_outer_diameter_m", "section_wall_m");
-    if !link.has(outer) && !link.has(wall) {
-        return Ok(None);
+/// The section of the table of a link; `None` where it gives none.
+pub(super) fn section(link: &Section<'_>) -> Result<Option<BeamSection>> {
+    let first = |keys: &[&'static str]| keys.iter().copied().find(|key| link.has(key));
+    let kinds = [first(&TUBE), first(&BOX), first(&GENERAL)];
+    let mut given = kinds.into_iter().flatten();
+    let (one, other) = (given.next(), given.next());
+    if let (Some(one), Some(other)) = (one, other) {
+        return Err(link
+            .error(
+                other,
+                format!("given together with {one}: the link has two sections"),
+            )
+            .remedy("keep one of them: a round tube, a rectangular tube, or area and second moments")
+            .into());
     }
-    let outer_diameter_m = needed(link, outer, link.number(outer, Bounds::POSITIVE)?, WHERE_SECTION)?;
-    let thickest = Bounds::above_up_to(0.0, outer_diameter_m / 2.0);
-    let wall_m = needed(link, wall, link.number(wall, thickest)?, WHERE_SECTION)?;
+    let without = |key: &str, of: &str| -> Result<()> {
+        match link.has(key) {
+            true => Err(link
+                .error(key, format!("given without {of}"))
+                .remedy("give that as well, or take this out (docs/files.md, the robot)")
+                .into()),
+            false => Ok(()),
+        }
+    };
+    let positive = |key: &str, whence| needed(link, key, link.number(key, Bounds::POSITIVE)?, whence);
+    let wall = |thickest_m: f64, whence| {
+        let bounds = Bounds::above_up_to(0.0, thickest_m);
+        needed(link, WALL, link.number(WALL, bounds)?, whence)
+    };
+    let shape = match kinds {
+        [None, None, None] if !link.has(WALL) => {
+            for key in [HEIGHT_AXIS, YOUNG, SHEAR] {
+                without(key, "a section, so that the link is rigid")?;
+            }
+            return Ok(None);
+        }
+        [_, Some(_), _] => {
+            let [width_m, height_m] = [positive(BOX[0], WHERE_BOX)?, positive(BOX[1], WHERE_BOX)?];
+            SectionShape::Box {
+                width_m,
+                height_m,
+                wall_m: wall(0.5 * width_m.min(height_m), WHERE_BOX)?,
+                height_axis: height_axis(link)?,
+            }
+        }
+        [_, _, Some(_)] => {
+            without(WALL, "a tube that it is the wall of")?;
+            SectionShape::General {
+                area_m2: positive(GENERAL[0], WHERE_GENERAL)?,
+                second_moment_y_m4: positive(GENERAL[1], WHERE_GENERAL)?,
+                second_moment_z_m4: positive(GENERAL[2], WHERE_GENERAL)?,
+                torsion_constant_m4: positive(GENERAL[3], WHERE_GENERAL)?,
+                height_axis: height_axis(link)?,
+            }
+        }
+        _ => {
+            without(HEIGHT_AXIS, "a section that is not round")?;
+            let outer_diameter_m = positive(TUBE[0], WHERE_SECTION)?;
+            SectionShape::Tube {
+                outer_diameter_m,
+                wall_m: wall(0.5 * outer_diameter_m, WHERE_SECTION)?,
+            }
+        }
+    };
+    let young_pa = link.number(YOUNG, Bounds::POSITIVE)?;
+    if young_pa.is_none() {
+        without(SHEAR, YOUNG)?;
+    }
     Ok(Some(BeamSection {
-        outer_diameter_m,
-        wall_m,
+        shape,
+        young_pa,
+        shear_pa: link.number(SHEAR, Bounds::POSITIVE)?,
     }))
+}
+
+fn height_axis(link: &Section<'_>) -> Result<[f64; 3]> {
+    let axis: Option<[f64; 3]> = link.array(HEIGHT_AXIS, "[x, y, z]")?;
+    let axis = needed(link, HEIGHT_AXIS, axis, WHERE_HEIGHT)?;
+    match axis.iter().any(|a| a.abs() > 1e-6) {
+        true => Ok(axis),
+        false => Err(link
+            .error(HEIGHT_AXIS, "has no length")
+            .remedy(WHERE_HEIGHT)
+            .into()),
+    }
 }
 
 fn tool(top: &Section<'_>) -> Result<ToolFrame> {
@@ -311,13 +403,9 @@ mod tests {
         let mass: f64 = robot.links.iter().map(|l| l.mass_kg).sum();
         assert_relative_eq!(mass, 1119.37979083, epsilon = 1e-8);
         // Sections as datasets/irb6640/robot.toml estimates them: link 5 has no length and stays rigid.
-        let sections: Vec<_> = robot
-            .links
-            .iter()
-            .map(|l| l.section.map(|s| (s.outer_diameter_m, s.wall_m)))
-            .collect();
-        assert_eq!(sections[0], Some((0.45, 0.03)));
-        assert_eq!(sections[3], Some((0.24, 0.018)));
+        let sections: Vec<_> = robot.links.iter().map(|l| l.section).collect();
+        assert_eq!(sections[0], Some(BeamSection::tube(0.45, 0.03)));
+        assert_eq!(sections[3], Some(BeamSection::tube(0.24, 0.018)));
         assert_eq!(sections[4], None);
         assert!(robot.joints.iter().all(|j| j.limits_rad.is_some()));
     }
@@ -341,6 +429,48 @@ mod tests {
             (
                 format!("{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.06\n"),
                 "link[0].section_wall_m: is 0.06",
+            ),
+            (
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_area_m2 = 1\n"
+                ),
+                "robot.toml:11: link[0].section_area_m2: given together with section_outer_diameter_m: the link has two sections",
+            ),
+            (
+                format!(
+                    "{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.06\n"
+                ),
+                "link[0].section_wall_m: is 0.06",
+            ),
+            (
+                format!(
+                    "{joint}{link}section_width_m = 0.1\nsection_height_m = 0.2\nsection_wall_m = 0.05\n"
+                ),
+                "link[0].section_height_axis: missing",
+            ),
+            (
+                format!("{joint}{link}section_area_m2 = 1e-3\nsection_second_moment_y_m4 = 1e-6\n"),
+                "link[0].section_second_moment_z_m4: missing",
+            ),
+            (
+                format!("{joint}{link}section_area_m2 = 1e-3\nsection_wall_m = 0.01\n"),
+                "link[0].section_wall_m: given without a tube",
+            ),
+            (
+                format!("{joint}{link}young_pa = 7e10\n"),
+                "link[0].young_pa: given without a section",
+            ),
+            (
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nshear_pa = 3e10\n"
+                ),
+                "link[0].shear_pa: given without young_pa",
+            ),
+            (
+                format!(
+                    "{joint}{link}section_outer_diameter_m = 0.1\nsection_wall_m = 0.01\nsection_height_axis = [0, 1, 0]\n"
+                ),
+                "link[0].section_height_axis: given without a section that is not round",
             ),
             (
                 joint.replace("1e-6", "0.0") + link,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::data::{JointSpec, LinkSpec, RobotSpec};
+use crate::data::{BeamSection, JointSpec, LinkSpec, RobotSpec, SectionShape};
 use crate::text::{quoted, to_degrees};
 
 fn list(values: &[f64]) -> String {
@@ -10,13 +10,30 @@ fn list(values: &[f64]) -> String {
     format!("[{}]", all.join(", "))
 }
 
+/// What stands in a robot file for people only.
+#[derive(Debug, Clone, Default)]
+pub struct RobotComments {
+    /// At the head of the file.
+    pub head: Vec<String>,
+    /// Above the numbers of each joint; joints beyond have none.
+    pub joints: Vec<Vec<String>>,
+    /// Likewise of each link.
+    pub links: Vec<Vec<String>>,
+    /// Behind each joint's compliance; `None`: that it is a guess, where it is one.
+    pub compliance: Option<String>,
+}
+
+fn comments<'a>(lines: impl IntoIterator<Item = &'a String>, text: &mut String) {
+    for line in lines {
+        let _ = writeln!(text, "# {}", line.replace(['\n', '\r'], " "));
+    }
+}
+
 impl RobotSpec {
-    /// The robot file of this robot; `notes` stand as comments at its head, guesses under `guesses` and next to the values.
-    pub fn to_toml(&self, notes: &[String]) -> String {
+    /// The robot file of this robot; guesses stand under `guesses` and next to the values.
+    pub fn to_toml(&self, about: &RobotComments) -> String {
         let mut text = String::new();
-        for note in notes {
-            let _ = writeln!(text, "# {}", note.replace(['\n', '\r'], " "));
-        }
+        comments(&about.head, &mut text);
         let _ = writeln!(text, "name = {}", quoted(&self.name));
         if !self.guesses.is_empty() {
             let all: Vec<String> = self
@@ -30,8 +47,10 @@ impl RobotSpec {
                 all.concat()
             );
         }
-        for joint in &self.joints {
-            self.joint(joint, &mut text);
+        for (i, joint) in self.joints.iter().enumerate() {
+            text += "\n[[joint]]\n";
+            comments(about.joints.get(i).into_iter().flatten(), &mut text);
+            self.joint(joint, about.compliance.as_deref(), &mut text);
         }
         let tool = &self.tool;
         let _ = write!(
@@ -46,14 +65,15 @@ impl RobotSpec {
             let tilt = to_degrees(tool.tilt_about_flange_y_rad);
             let _ = writeln!(text, "tilt_about_flange_y_deg = {tilt:?}");
         }
-        for link in &self.links {
+        for (i, link) in self.links.iter().enumerate() {
+            text += "\n[[link]]\n";
+            comments(about.links.get(i).into_iter().flatten(), &mut text);
             write_link(link, &mut text);
         }
         text
     }
 
-    fn joint(&self, joint: &JointSpec, text: &mut String) {
-        *text += "\n[[joint]]\n";
+    fn joint(&self, joint: &JointSpec, compliance_from: Option<&str>, text: &mut String) {
         if let Some(name) = &joint.name {
             let _ = writeln!(text, "name = {}", quoted(name));
         }
@@ -78,9 +98,10 @@ impl RobotSpec {
                 );
             }
         }
-        let mark = match self.guesses.iter().any(|guess| guess.contains("compliance")) {
-            true => "  # a guess, see above",
-            false => "",
+        let mark = match compliance_from {
+            Some(from) => format!("  # {from}"),
+            None if self.compliances_are_guessed() => "  # a guess, see above".into(),
+            None => String::new(),
         };
         let _ = writeln!(
             text,
@@ -94,7 +115,6 @@ impl RobotSpec {
 }
 
 fn write_link(link: &LinkSpec, text: &mut String) {
-    *text += "\n[[link]]\n";
     if let Some(name) = &link.name {
         let _ = writeln!(text, "name = {}", quoted(name));
     }
@@ -110,11 +130,44 @@ fn write_link(link: &LinkSpec, text: &mut String) {
     if let Some(com_m) = link.com_m {
         let _ = writeln!(text, "com_m = {}", list(&com_m));
     }
-    if let Some(section) = link.section {
-        let _ = write!(
-            text,
-            "section_outer_diameter_m = {:?}\nsection_wall_m = {:?}\n",
-            section.outer_diameter_m, section.wall_m
-        );
+    if let Some(section) = &link.section {
+        *text += &section_text(section);
     }
+}
+
+/// The keys of a `[[link]]` that say which beam it is.
+pub(crate) fn section_text(section: &BeamSection) -> String {
+    let mut text = match &section.shape {
+        SectionShape::Tube {
+            outer_diameter_m,
+            wall_m,
+        } => format!("section_outer_diameter_m = {outer_diameter_m:?}\nsection_wall_m = {wall_m:?}\n"),
+        SectionShape::Box {
+            width_m,
+            height_m,
+            wall_m,
+            ..
+        } => format!(
+            "section_width_m = {width_m:?}\nsection_height_m = {height_m:?}\nsection_wall_m = {wall_m:?}\n"
+        ),
+        SectionShape::General {
+            area_m2,
+            second_moment_y_m4,
+            second_moment_z_m4,
+            torsion_constant_m4,
+            ..
+        } => format!(
+            "section_area_m2 = {area_m2:?}\nsection_second_moment_y_m4 = {second_moment_y_m4:?}\n\
+             section_second_moment_z_m4 = {second_moment_z_m4:?}\nsection_torsion_constant_m4 = {torsion_constant_m4:?}\n"
+        ),
+    };
+    if let Some(axis) = section.shape.height_axis() {
+        let _ = writeln!(text, "section_height_axis = {}", list(&axis));
+    }
+    for (key, modulus) in [("young_pa", section.young_pa), ("shear_pa", section.shear_pa)] {
+        if let Some(pa) = modulus {
+            let _ = writeln!(text, "{key} = {pa:?}");
+        }
+    }
+    text
 }

@@ -23,6 +23,8 @@ pub struct Campaign {
     pub robot: Option<RobotSection>,
     /// Where the robot stood, in the order of the file.
     pub postures: Vec<Posture>,
+    /// Of which of them the robot's joints cannot stand so, a sentence each.
+    pub beyond_limits: Vec<String>,
     /// Where on the robot was measured, in the order of the file; each has a node number of its own.
     pub points: Vec<Point>,
     /// The `[[frf]]` tables, in the order of the file.

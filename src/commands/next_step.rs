@@ -104,6 +104,14 @@ impl<'a> Guide<'a> {
             )
     }
 
+    /// After `calibrate --free`, where the links only imitate what is missing.
+    pub fn imitated(&self) -> String {
+        format!(
+            "leave the links and run {} for what is missing",
+            self.run_here("diagnose")
+        )
+    }
+
     /// After `compare`. `mostly`: where the error sits.
     pub fn compared(&self, reduced_chi2: f64, error: &ErrorTotals, mostly: Option<String>) -> String {
         self.error_then(

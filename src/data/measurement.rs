@@ -1,5 +1,7 @@
 //! Where the robot stood, and where on it was measured.
 
+use crate::data::RobotSpec;
+
 /// How the robot stood.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Posture {
@@ -7,6 +9,18 @@ pub struct Posture {
     pub id: String,
     /// One angle for each joint, base first, before the joints' offsets.
     pub joints_deg: Vec<f64>,
+}
+
+impl Posture {
+    /// That a joint of the robot cannot stand so, in a sentence; `None` where all can.
+    pub fn beyond_limits(&self, robot: &RobotSpec) -> Option<String> {
+        let beyond = robot.beyond_limits(&self.joints_deg)?;
+        Some(format!(
+            "posture {} is beyond the joint limits of the robot file: {beyond}. Check order, sign and zero of the angles, or correct \
+             limits_deg in the robot file",
+            self.id
+        ))
+    }
 }
 
 /// The body of the robot that a measurement point sits on.

@@ -22,6 +22,6 @@ pub use measured_frf::{FrfSet, MeasuredDof, MeasuredFrf};
 pub use measurement::{AxesRef, BodyRef, Point, Posture};
 pub use orthogonal::{ChipFormation, LinearLaw, OrthogonalSection};
 pub use robot_section::{LinkGroup, LinkTolerances, RobotSection};
-pub use robot_spec::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
+pub use robot_spec::{BeamSection, JointPlacement, JointSpec, LinkSpec, RobotSpec, SectionShape, ToolFrame};
 pub use time_record::{Channel, ChannelRole, Sample, TimeRecord};
 pub use tool::{Tool, ToolKind, ToolSegment, Tooth, USUAL_CHISEL_EDGE_ANGLE_DEG};

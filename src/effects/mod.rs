@@ -27,4 +27,4 @@ pub use registry::{CUTTING, Registry, STRUCTURAL};
 pub use request::requested;
 pub use site::{At, EffectName, Site};
 pub use spot::Spot;
-pub use structural::{ChannelFilter, Conditions, DataSummary, PostureSetting, Structure};
+pub use structural::{ChannelFilter, Conditions, DataSummary, LINK_FLEXIBILITY, PostureSetting, Structure};

@@ -54,7 +54,7 @@ pub fn centre_of_mass_form(chain: &Chain) -> Result<CentreOfMassForm> {
         let stiffness = compliance.cholesky().map(|c| c.inverse()).ok_or_else(|| {
             Error::computation(format!(
                 "body {} has no elastic path in all six directions to the body before it: give its link a section \
-                 (section_outer_diameter_m, section_wall_m) in the robot file",
+                 (section_outer_diameter_m and section_wall_m, or another one) in the robot file",
                 b + 1
             ))
         })?;

@@ -36,7 +36,7 @@ pub enum FileNumber {
         /// Number of the joint, from 1.
         joint: usize,
     },
-    /// Wall of the hollow round section, m.
+    /// Wall of the hollow section, m.
     Wall {
         /// Number of the link, from 1.
         link: usize,
@@ -100,9 +100,9 @@ impl FileNumber {
             .collect()
     }
 
-    /// Walls of the links that have a section.
+    /// Walls of the links whose section has one.
     pub fn walls(spec: &RobotSpec) -> Vec<FileNumber> {
-        let bending = (1..=spec.links.len()).filter(|i| spec.links[i - 1].section.is_some());
+        let bending = (1..=spec.links.len()).filter(|i| walled(spec, *i).is_some());
         bending.map(|link| FileNumber::Wall { link }).collect()
     }
 
@@ -125,7 +125,7 @@ impl FileNumber {
             FileNumber::Centre { link, axis } => centre_m(robot, link)[axis],
             FileNumber::Offset { joint } => spec.joints[joint - 1].d_m,
             FileNumber::Length { joint } => spec.joints[joint - 1].a_m,
-            FileNumber::Wall { link } => spec.links[link - 1].section.map_or(0.0, |s| s.wall_m),
+            FileNumber::Wall { link } => walled(spec, link).unwrap_or(0.0),
         }
     }
 
@@ -152,7 +152,7 @@ impl FileNumber {
             FileNumber::Length { joint } => robot.spec.joints[joint - 1].a_m = value,
             FileNumber::Wall { link } => {
                 if let Some(section) = &mut robot.spec.links[link - 1].section {
-                    section.wall_m = value;
+                    section.shape.set_wall_m(value);
                 }
             }
         }
@@ -172,6 +172,11 @@ fn centre_m(robot: &RobotModel, link: usize) -> [f64; 3] {
         let centre: Point3<f64> = robot.link_com(&kinematics, link);
         (kinematics.frames[link].inverse() * centre).coords.into()
     })
+}
+
+/// Wall of the section of a link, m; `None` where it has none.
+fn walled(spec: &RobotSpec, link: usize) -> Option<f64> {
+    spec.links[link - 1].section?.shape.wall_m()
 }
 
 #[cfg(test)]

@@ -17,10 +17,7 @@ pub fn irb6640() -> RobotSpec {
     let link = |mass_kg: f64, inertia_kg_m2: [f64; 3], section: Option<(f64, f64)>| LinkSpec {
         mass_kg,
         inertia_kg_m2,
-        section: section.map(|(outer_diameter_m, wall_m)| BeamSection {
-            outer_diameter_m,
-            wall_m,
-        }),
+        section: section.map(|(outer_diameter_m, wall_m)| BeamSection::tube(outer_diameter_m, wall_m)),
         ..LinkSpec::default()
     };
     RobotSpec {

@@ -31,6 +31,9 @@ pub struct Baseline {
     pub young_pa: Option<Dual>,
 }
 
+/// A common Young's modulus beyond that of any material says that no link bends, those with a modulus of their own included.
+pub const NOTHING_BENDS_PA: f64 = 2e13;
+
 /// Damping ratio a model starts from when nothing else is given.
 pub const NOMINAL_DAMPING_RATIO: f64 = 0.03;
 
@@ -134,7 +137,22 @@ impl RobotModel {
         }
     }
 
-    /// The two beam halves of link `i`; none where the link has no section or no length.
+    /// The first link whose section is not round and has its height along the link, so that it has no direction.
+    pub fn link_with_lost_section(&self) -> Option<usize> {
+        let kinematics = Kinematics::new(&self.spec, &vec![0.0; self.joint_count()]);
+        (1..=self.joint_count()).find(|i| {
+            let axis = self.spec.links[i - 1].section.and_then(|s| s.shape.height_axis());
+            let (start, end) = kinematics.link_ends(*i);
+            let along = end - start;
+            axis.filter(|_| along.norm() > 1e-9).is_some_and(|axis| {
+                let axis = kinematics.link_rotation(*i) * Vector3::from(axis);
+                axis.normalize().cross(&along.normalize()).norm() <= beam::ACROSS
+            })
+        })
+    }
+
+    /// The two beam halves of link `i`; none where the link has no section or no length. `young`: the common modulus, of links that have
+    /// no modulus of their own.
     pub fn link_halves(&self, kinematics: &Kinematics, i: usize, young: &Dual) -> Vec<Element> {
         let (start, end) = kinematics.link_ends(i);
         let length_m = (end - start).norm();
@@ -143,10 +161,19 @@ impl RobotModel {
         };
         let middle = nalgebra::center(&start, &end);
         let shape = beam::tip_stiffness_per_pa(&section, 0.5 * length_m);
+        let height_axis = section.shape.height_axis();
+        let height_axis = height_axis.map(|axis| kinematics.link_rotation(i) * Vector3::from(axis));
+        let young = match section.young_pa {
+            Some(own) if young.value > NOTHING_BENDS_PA => young.scale(own / NOTHING_BENDS_PA),
+            Some(own) => Dual::constant(own),
+            None => young.clone(),
+        };
         [(start, middle, Slot::FirstHalf), (middle, end, Slot::SecondHalf)]
             .into_iter()
             .map(|(from, to, slot)| {
-                let rotation = beam::tip_frame(from, to).rotation.to_rotation_matrix();
+                let rotation = beam::tip_frame(from, to, height_axis)
+                    .rotation
+                    .to_rotation_matrix();
                 let directions = (0..6)
                     .map(|k| {
                         let axis = rotation.matrix().column(k % 3).into_owned();
@@ -220,7 +247,7 @@ impl RobotModel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::{BeamSection, JointSpec, LinkSpec, ToolFrame};
+    use crate::data::{BeamSection, JointSpec, LinkSpec, SectionShape, ToolFrame};
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::frf::natural_frequencies_hz;
     use crate::robot::{FrfBasis, ModalBasis};
@@ -310,52 +337,110 @@ mod tests {
         }
     }
 
-    /// A chain of straight beams behind one nearly rigid joint each is the Euler–Bernoulli cantilever: static tip
-    /// compliance L³/3EI exactly, whatever the number of links.
-    #[test]
-    fn straight_chain_of_beams_is_a_cantilever() {
-        let section = BeamSection {
-            outer_diameter_m: 0.1,
-            wall_m: 0.01,
+    /// Four straight beams of 0.5 m along x behind one nearly rigid joint each; z of the links is that of the base.
+    fn straight(section: BeamSection) -> RobotModel {
+        let joint = JointSpec {
+            a_m: 0.5,
+            compliance_rad_per_nm: 1e-16,
+            ..JointSpec::default()
         };
-        let count = 4;
-        let spec = RobotSpec {
+        let link = LinkSpec {
+            mass_kg: 1.0,
+            inertia_kg_m2: [0.1; 3],
+            section: Some(section),
+            ..LinkSpec::default()
+        };
+        RobotModel::new(RobotSpec {
             name: "straight".into(),
-            joints: vec![
-                JointSpec {
-                    d_m: 0.0,
-                    a_m: 0.5,
-                    alpha_rad: 0.0,
-                    offset_rad: 0.0,
-                    compliance_rad_per_nm: 1e-16,
-                    ..JointSpec::default()
-                };
-                count
-            ],
-            links: vec![
-                LinkSpec {
-                    mass_kg: 1.0,
-                    inertia_kg_m2: [0.1; 3],
-                    section: Some(section),
-                    ..LinkSpec::default()
-                };
-                count
-            ],
+            joints: vec![joint; 4],
+            links: vec![link; 4],
             tool: ToolFrame::default(),
             guesses: Vec::new(),
-        };
-        let model = RobotModel::new(spec);
+        })
+    }
+
+    fn tip_compliance(model: &RobotModel, young_pa: f64) -> nalgebra::Matrix6<f64> {
         let kinematics = model.kinematics(&[0.0; 4]).unwrap();
         let mut baseline = Baseline::nominal(&model.spec);
-        let young = 70e9;
-        baseline.young_pa = Some(Dual::constant(young));
+        baseline.young_pa = Some(Dual::constant(young_pa));
         let chain = model.chain(&kinematics, &baseline);
-        let c = chain.compliance(kinematics.tcp(), model.flange_place()).unwrap();
-        let (l, i) = (2.0f64, section.second_moment_m4());
+        chain.compliance(kinematics.tcp(), model.flange_place()).unwrap()
+    }
+
+    /// The chain is the Euler–Bernoulli cantilever: static tip compliance L³/3EI exactly, whatever the number of links.
+    #[test]
+    fn straight_chain_of_beams_is_a_cantilever() {
+        let section = BeamSection::tube(0.1, 0.01);
+        let young = 70e9;
+        let c = tip_compliance(&straight(section), young);
+        let stiffness = section.shape.stiffness();
+        let (l, i) = (2.0f64, stiffness.about_y_m4);
         assert_relative_eq!(c[(1, 1)], l.powi(3) / (3.0 * young * i), max_relative = 1e-6);
         assert_relative_eq!(c[(2, 2)], l.powi(3) / (3.0 * young * i), max_relative = 1e-6);
-        assert_relative_eq!(c[(0, 0)], l / (young * section.area_m2()), max_relative = 1e-6);
+        assert_relative_eq!(c[(0, 0)], l / (young * stiffness.area_m2), max_relative = 1e-6);
         assert_relative_eq!(c[(5, 1)], l.powi(2) / (2.0 * young * i), max_relative = 1e-6);
+    }
+
+    /// A flat bar bends far more across its height than along it, wherever that points, and with moduli of its own the common one does
+    /// nothing, short of one that says that nothing bends.
+    #[test]
+    fn sections_that_are_not_round_bend_as_they_are_turned() {
+        let (width_m, height_m, wall_m) = (0.04, 0.1, 0.005);
+        let (young, shear, l) = (70e9, 30e9, 2.0f64);
+        let bar = |height_axis, own: bool| BeamSection {
+            shape: SectionShape::Box {
+                width_m,
+                height_m,
+                wall_m,
+                height_axis,
+            },
+            young_pa: own.then_some(young),
+            shear_pa: own.then_some(shear),
+        };
+        let hole = |a: f64, b: f64| (a - 2.0 * wall_m) * (b - 2.0 * wall_m).powi(3);
+        let along_height = (width_m * height_m.powi(3) - hole(width_m, height_m)) / 12.0;
+        let along_width = (height_m * width_m.powi(3) - hole(height_m, width_m)) / 12.0;
+        let torsion = bar([0.0; 3], true).shape.stiffness().torsion_m4;
+        for (height_axis, along, across) in [
+            ([0.0, 0.0, 1.0], 2, 1),
+            ([0.0, 3.0, 0.0], 1, 2),
+            // What is along the beam does not count.
+            ([5.0, 0.0, -1.0], 2, 1),
+        ] {
+            for (section, common, g) in [
+                (bar(height_axis, true), 1e9, shear),
+                (bar(height_axis, false), young, young / 2.6),
+            ] {
+                let c = tip_compliance(&straight(section), common);
+                let bent = |i: f64| l.powi(3) / (3.0 * young * i);
+                // The joints, 1e-16 rad/(N·m) each, turn about z.
+                assert_relative_eq!(c[(along, along)], bent(along_height), max_relative = 1e-6);
+                assert_relative_eq!(c[(across, across)], bent(along_width), max_relative = 1e-6);
+                assert_relative_eq!(c[(3, 3)], l / (g * torsion), max_relative = 1e-6);
+            }
+        }
+        let rigid = tip_compliance(&straight(bar([0.0, 0.0, 1.0], true)), 1e23);
+        assert!(rigid[(1, 1)] < 1e-9 * l.powi(3) / (3.0 * young * along_width) + 1e-14);
+    }
+
+    #[test]
+    fn a_height_along_the_link_is_no_direction() {
+        let mut robot = straight(BeamSection::tube(0.1, 0.01));
+        assert_eq!(robot.link_with_lost_section(), None);
+        for (axis, lost) in [([0.0, 0.0, 1.0], None), ([1.0, 0.0, 1e-3], Some(3))] {
+            robot.spec.links[2].section = Some(BeamSection {
+                shape: SectionShape::General {
+                    area_m2: 1e-3,
+                    second_moment_y_m4: 1e-6,
+                    second_moment_z_m4: 2e-6,
+                    torsion_constant_m4: 1e-6,
+                    height_axis: axis,
+                },
+                young_pa: None,
+                shear_pa: None,
+            });
+            assert_eq!(robot.link_with_lost_section(), lost);
+        }
     }
 
     /// FRF derivatives against central differences, with modal damping and a branch, for stiffness, damping and mass.

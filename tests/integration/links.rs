@@ -104,6 +104,109 @@ fn tolerances_in_the_campaign_free_for_good() {
     assert!(found["freed"].is_null());
     let run = lobestone(&["diagnose", &name]);
     assert!(run.stdout.contains("NOTHING is missing"), "{}", run.stdout);
+
+    // What goes out as a URDF is the robot as calibrated, and it comes in again.
+    let out = dir.path().join("out.urdf");
+    let said = document(&["model", &name, "--urdf", out.to_str().unwrap()]);
+    let again = tempfile::tempdir().unwrap();
+    let cell = again.path().to_str().unwrap();
+    let posture = "p1=135,-2,53,83,30,-117";
+    let made = document(&[
+        "init",
+        cell,
+        "--robot",
+        out.to_str().unwrap(),
+        "--posture",
+        posture,
+    ]);
+    assert_eq!(made["complete"], true, "{made}");
+    let back = document(&["model", cell]);
+    let (fitted, back) = (&said["calibrated_postures"][0], &back["postures"][0]);
+    let list = |values: &Value| -> Vec<f64> {
+        let all = values.as_array().unwrap().iter();
+        all.map(|v| v.as_f64().unwrap()).collect()
+    };
+    for key in [
+        "natural_frequencies_hz",
+        "tcp_m",
+        "centre_of_mass_m",
+        "gravity_torques_nm",
+    ] {
+        let [expected, found] = [fitted, back].map(|posture| list(&posture[key]));
+        assert_eq!(expected.len(), found.len());
+        for (e, f) in expected.iter().zip(&found) {
+            assert!((e - f).abs() < 1e-9 * e.abs().max(1.0), "{key} {e} {f}");
+        }
+    }
+}
+
+/// What `--free` found is kept in a robot file, with which the campaign calibrates to the same error.
+#[test]
+fn what_was_found_is_kept() {
+    let (dir, name) = campaign();
+    let file = dir.path().join("fitted.toml");
+    let arguments = [
+        "calibrate",
+        &name,
+        "--free",
+        "inertias,lengths",
+        "--write-robot",
+        file.to_str().unwrap(),
+    ];
+    let found = document(&arguments);
+    assert_eq!(found["freed"]["robot_file"], file.to_str().unwrap());
+    assert_eq!(found["freed"]["is_believable"], true);
+    let text = std::fs::read_to_string(&file).unwrap();
+    for words in [
+        "# inertia-x fitted: ",
+        "in irb6640",
+        "# d fitted: ",
+        "Made by lobestone of irb6640",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let run = lobestone(&arguments);
+    assert!(
+        run.status == Some(1) && run.stderr.contains("is there already"),
+        "{}",
+        run.stderr
+    );
+    let elsewhere = [
+        "calibrate",
+        &name,
+        "--free",
+        "lengths",
+        "--write-robot",
+        "fitted.toml",
+    ];
+    let run = lobestone(&elsewhere);
+    assert!(
+        run.status == Some(1) && run.stderr.contains("not in the campaign's folder"),
+        "{}",
+        run.stderr
+    );
+    let told = dir.path().join("campaign.toml");
+    let campaign = std::fs::read_to_string(&told).unwrap();
+    std::fs::write(
+        &told,
+        campaign.replace("model = \"irb6640\"", "model = \"fitted.toml\""),
+    )
+    .unwrap();
+    let kept = document(&["calibrate", &name]);
+    let error = |document: &Value| document["error"]["nrms"].as_f64().unwrap();
+    assert!(
+        (error(&kept) / error(&found) - 1.0).abs() < 1e-4,
+        "{} {}",
+        error(&kept),
+        error(&found)
+    );
+    let left = document(&["calibrate", &name, "--free", "inertias,lengths"]);
+    assert_eq!(
+        left["freed"]["departing"].as_array().unwrap().len(),
+        0,
+        "{}",
+        left["freed"]
+    );
 }
 
 /// Where the links are those of the file, freeing all of them changes nothing, and the program says so.
@@ -122,6 +225,22 @@ fn nothing_is_freed_that_should_not_be() {
     assert!(!unsaid.is_empty());
     let run = lobestone(&["calibrate", dir, "--free", "inertias"]);
     assert!(run.stdout.contains("agree with the robot file"), "{}", run.stdout);
+}
+
+/// Numbers that predict left-out postures no better may be what the file says, and are not offered to be kept.
+#[test]
+fn what_predicts_nothing_better_is_not_called_wrong() {
+    let dir = blind("frf-9216");
+    let run = lobestone(&["calibrate", dir.to_str().unwrap(), "--free", "links"]);
+    for words in [
+        "fit better with other values than the robot file's",
+        "leave them as they are",
+    ] {
+        assert!(run.stdout.contains(words), "{words}: {}", run.stdout);
+    }
+    for words in ["cannot be what", "--write-robot"] {
+        assert!(!run.stdout.contains(words), "{words}: {}", run.stdout);
+    }
 }
 
 #[test]

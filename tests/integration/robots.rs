@@ -139,9 +139,67 @@ fn robots_are_those_of_pinocchio() {
         ]);
         assert_eq!(made["complete"], true);
         let back = document(&["model", text(again.path())]);
-        // Compliances are guessed anew by the same rule; masses and geometry have come through the file.
+        // Compliances have come through the file next to the URDF, masses and geometry through the URDF.
         agrees_with(reference, &back);
     }
+}
+
+/// A file next to the URDF gives the compliances; what a joint cannot take is told.
+#[test]
+fn compliances_are_those_of_the_file_next_to_the_urdf() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, dir) = (folder.path().join("out.urdf"), folder.path().join("cell"));
+    let from = campaign_on(REFERENCES[0].robot, &[REFERENCES[0].joints_deg]);
+    document(&["model", text(from.path()), "--urdf", text(&out)]);
+    let beside = folder.path().join("out.compliances.toml");
+    let told = std::fs::read_to_string(&beside).unwrap();
+    let at = told.find("compliance_rad_per_nm = ").unwrap();
+    let line = told[at..].lines().next().unwrap();
+    let changed = told.replacen(line, "compliance_rad_per_nm = 1.25e-5", 1);
+    std::fs::write(&beside, &changed).unwrap();
+    std::fs::create_dir(&dir).unwrap();
+    let far = vec!["720"; REFERENCES[0].joints_deg.len()].join(",");
+    let arguments = [
+        "init",
+        text(&dir),
+        "--robot",
+        text(&out),
+        "--posture",
+        &format!("p1={far}"),
+    ];
+    let made = document(&arguments);
+    assert_eq!(made["robot"]["compliances_from"], text(&beside));
+    let warnings = made["warnings"].to_string();
+    assert!(
+        warnings.contains("posture p1 is beyond the joint limits") && warnings.contains("at 720°"),
+        "{warnings}"
+    );
+    let modelled = document(&["model", text(&dir)]);
+    let warnings = modelled["warnings"].to_string();
+    assert!(
+        warnings.contains("posture p1 is beyond the joint limits"),
+        "{warnings}"
+    );
+    let file = std::fs::read_to_string(dir.join("out.toml")).unwrap();
+    assert!(
+        file.contains("compliance_rad_per_nm = 1.25e-5  # from out.compliances.toml"),
+        "{file}"
+    );
+    std::fs::write(
+        &beside,
+        changed.replace(
+            "compliance_rad_per_nm = 1.25e-5",
+            "compliance_rad_per_nm = \"soft\"",
+        ),
+    )
+    .unwrap();
+    let run = lobestone(&[&arguments[..], &["--force"]].concat());
+    assert_eq!(run.status, Some(1));
+    assert!(
+        run.stderr.contains("joint[0].compliance_rad_per_nm") && run.stderr.contains("out.compliances.toml:"),
+        "{}",
+        run.stderr
+    );
 }
 
 /// What was decided and guessed is told, stands in the file, and the file is the robot's.

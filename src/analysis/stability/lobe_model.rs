@@ -278,6 +278,7 @@ impl ModelState {
     fn uncalibrated(campaign: &Campaign, asked: Asked, warnings: &mut Vec<String>) -> Result<Self> {
         warnings.push("the campaign has no FRFs: lobes are those of the uncalibrated robot file".into());
         let model = structure_model(campaign)?;
+        warnings.extend(campaign.beyond_limits.iter().cloned());
         warnings.extend(model.robot.spec.guesses_told());
         Ok(ModelState {
             current: FittedModel {

@@ -380,6 +380,55 @@ mod tests {
                 "rpy_in_flange_deg" => drop(table.remove("tilt_about_flange_y_deg")),
                 _ => {}
             }
+            // One kind of section a link, whole but for the key that is wrong.
+            let section = [
+                (
+                    &[
+                        "section_outer_diameter_m",
+                        "section_wall_m",
+                        "young_pa",
+                        "shear_pa",
+                    ][..],
+                    &["section_outer_diameter_m", "section_wall_m", "young_pa"][..],
+                ),
+                (
+                    &["section_width_m", "section_height_m"],
+                    &[
+                        "section_width_m",
+                        "section_height_m",
+                        "section_wall_m",
+                        "section_height_axis",
+                    ],
+                ),
+                (
+                    &[
+                        "section_area_m2",
+                        "section_second_moment_y_m4",
+                        "section_second_moment_z_m4",
+                        "section_torsion_constant_m4",
+                        "section_height_axis",
+                    ],
+                    &[
+                        "section_area_m2",
+                        "section_second_moment_y_m4",
+                        "section_second_moment_z_m4",
+                        "section_torsion_constant_m4",
+                        "section_height_axis",
+                    ],
+                ),
+            ];
+            if let Some((_, whole)) = section.iter().find(|(of, _)| of.contains(&key.name)) {
+                for other in ["section_outer_diameter_m", "section_wall_m"] {
+                    table.remove(other);
+                }
+                for (i, part) in whole.iter().enumerate() {
+                    let value = match *part {
+                        "section_height_axis" => Toml::Array([0.0, 0.0, 1.0].map(Toml::Float).into()),
+                        _ => Toml::Float(1.0 / (1 + 3 * i) as f64),
+                    };
+                    table.insert((*part).into(), value);
+                }
+            }
             table.insert(key.name.into(), Toml::Boolean(true));
             let message = load(&wrong).unwrap_err();
             assert!(

@@ -791,7 +791,7 @@ pub(crate) const JOINT: [Key; 10] = [
     ),
 ];
 
-pub(crate) const LINK: [Key; 7] = [
+pub(crate) const LINK: [Key; 16] = [
     may("name", Holds::Text, "Name of the link"),
     must("mass_kg", NOT_NEGATIVE, "Mass, kg"),
     must(
@@ -812,9 +812,54 @@ pub(crate) const LINK: [Key; 7] = [
     may(
         "section_outer_diameter_m",
         POSITIVE,
-        "Outer diameter of the tube that bends like the link, m; left out: rigid",
+        "Outer diameter of the tube that bends like the link, m; without any section: rigid",
     ),
-    may("section_wall_m", POSITIVE, "Wall of that tube, m"),
+    may(
+        "section_width_m",
+        POSITIVE,
+        "Or of a rectangular tube: outer width, across the link and its height, m",
+    ),
+    may(
+        "section_height_m",
+        POSITIVE,
+        "Outer height of the rectangular tube, along section_height_axis, m",
+    ),
+    may("section_wall_m", POSITIVE, "Wall of either tube, m"),
+    may(
+        "section_area_m2",
+        POSITIVE,
+        "Or of any other section: its area, m²",
+    ),
+    may(
+        "section_second_moment_y_m4",
+        POSITIVE,
+        "Its second moment of area about the width: bending along section_height_axis, m⁴",
+    ),
+    may(
+        "section_second_moment_z_m4",
+        POSITIVE,
+        "Its second moment of area about the height: bending across section_height_axis, m⁴",
+    ),
+    may(
+        "section_torsion_constant_m4",
+        POSITIVE,
+        "Its torsion constant J, m⁴",
+    ),
+    may(
+        "section_height_axis",
+        Holds::Array(3),
+        "Direction of the height in the link's frame, of a section that is not round",
+    ),
+    may(
+        "young_pa",
+        POSITIVE,
+        "Young's modulus of this link, Pa [the one that all links have in common]",
+    ),
+    may(
+        "shear_pa",
+        POSITIVE,
+        "Shear modulus of a link with its own young_pa, Pa [young_pa / 2.6]",
+    ),
 ];
 
 pub(crate) const TOOL_FRAME: [Key; 3] = [

@@ -12,6 +12,7 @@ use crate::campaign::{Campaign, campaign_file};
 use crate::commands::begin::init_robot::{MadeRobot, RobotArgs, RobotMade};
 use crate::commands::text::{Emphasis, setup_lines, table, warnings};
 use crate::commands::{Outcome, next_step};
+use crate::data::{Posture, RobotSpec};
 use crate::discrepancy::setup::{SetupCheck, SetupFinding};
 use crate::ingest::SIGNALS;
 use crate::{Error, InputError, Result};
@@ -214,6 +215,26 @@ pub fn run(args: InitArgs, as_json: bool) -> Result<Outcome> {
     begun
 }
 
+/// Which of the postures given the robot's joints cannot take. What cannot be read here, the draft tells.
+fn beyond_limits(args: &InitArgs, made: Option<&MadeRobot>) -> Vec<String> {
+    let named = args.robot.robot.as_deref();
+    let robot = match made {
+        Some(made) => Some(made.spec().clone()),
+        None => named.and_then(|name| RobotSpec::load(name, &args.dir).ok()),
+    };
+    let Some(robot) = robot else { return Vec::new() };
+    let given = args.postures.iter().filter_map(|(id, joints)| {
+        let angles = joints.split(',').map(|angle| angle.trim().parse().ok());
+        Some(Posture {
+            id: id.clone(),
+            joints_deg: angles.collect::<Option<_>>()?,
+        })
+    });
+    given
+        .filter_map(|posture| posture.beyond_limits(&robot))
+        .collect()
+}
+
 /// Scans the folder, asks, writes `campaign.toml`.
 fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Outcome> {
     let dir = &args.dir;
@@ -284,6 +305,7 @@ fn begin(args: &InitArgs, made: Option<&MadeRobot>, as_json: bool) -> Result<Out
         true => Campaign::load(dir).map_or_else(|e| vec![Err(e)], |c| setup_checks(&c)),
         false => Vec::new(),
     };
+    notes.extend(beyond_limits(args, made));
     for check in checks {
         match check {
             Ok(check) => setup.extend(check.findings.into_iter().filter(SetupFinding::is_likely)),

@@ -4,9 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::campaign::robot_text::RobotComments;
 use crate::commands::text::Emphasis;
+use crate::data::RobotSpec;
 use crate::files::{write_atomically, write_new};
-use crate::robot::urdf::{Request, UrdfRobot, read};
+use crate::robot::urdf::{BesideUrdf, Request, UrdfRobot, beside, read};
+use crate::text::listed;
 use crate::{Error, InputError, Result};
 
 /// Which robot `lobestone init` writes into the campaign file.
@@ -100,6 +103,7 @@ impl MadeRobot {
             base_link: args.base_link.clone(),
             tool_link: args.tool_link.clone(),
             payload_kg: args.payload_kg,
+            beside: BesideUrdf::find(&urdf)?,
         };
         let robot = read(&urdf, &text, &request)?;
         let stem = urdf
@@ -120,25 +124,40 @@ impl MadeRobot {
         }))
     }
 
+    /// The robot.
+    pub fn spec(&self) -> &RobotSpec {
+        &self.robot.spec
+    }
+
     /// Writes the robot file; whether there was one before.
     ///
     /// # Errors
     /// There is one, and it is not to be replaced; what the file system refuses.
     pub fn write(&self, replace: bool) -> Result<bool> {
-        let mut notes = vec![format!(
+        let mut head = vec![format!(
             "Made by lobestone of {}.",
             self.urdf
                 .file_name()
                 .map(|n| n.to_string_lossy().into_owned())
                 .unwrap_or_default()
         )];
-        notes.extend(self.robot.notes.iter().cloned());
-        notes.push(
-            "Compliances, damping and the inertia of the drives are not in a URDF: compliances are guesses here, damping starts at \
-             3 %, drives are not modelled. Links are rigid until they are given a section."
+        head.extend(self.robot.notes.iter().cloned());
+        let mut compliance = None;
+        head.push(match self.beside() {
+            Some(told) => {
+                compliance = self.robot.beside.as_ref().map(|said| format!("from {}", said.file_name));
+                format!("{told} Damping starts at 3 %, drives are not modelled.")
+            }
+            None => "Compliances, damping and the inertia of the drives are not in a URDF: compliances are guesses here, damping starts \
+                     at 3 %, drives are not modelled. Links are rigid until they are given a section."
                 .into(),
-        );
-        let text = self.robot.spec.to_toml(&notes);
+        });
+        let comments = RobotComments {
+            head,
+            compliance,
+            ..RobotComments::default()
+        };
+        let text = self.robot.spec.to_toml(&comments);
         let was_there = self.file.symlink_metadata().is_ok();
         if replace {
             write_atomically(&self.file, text.as_bytes())?;
@@ -149,6 +168,23 @@ impl MadeRobot {
                 .into());
         }
         Ok(was_there)
+    }
+
+    /// What the file next to the URDF gave, in sentences; `None` where there is none.
+    fn beside(&self) -> Option<String> {
+        let said = self.robot.beside.as_ref()?;
+        let source = said.source.as_ref().map_or(String::new(), |s| format!(" ({s})"));
+        let mut told = format!(
+            "Compliances and sections of links are from {}{source}.",
+            said.file_name
+        );
+        if !said.notes.is_empty() {
+            told += &format!(
+                " It also says what a robot file has no place for: {}.",
+                listed(&said.notes)
+            );
+        }
+        Some(told)
     }
 
     /// For people.
@@ -163,6 +199,9 @@ impl MadeRobot {
         );
         for note in &self.robot.notes {
             text += &format!("  {note}\n");
+        }
+        if let Some(told) = self.beside() {
+            text += &format!("  {told}\n");
         }
         for guess in &spec.guesses {
             text += &format!("  {}: {guess}\n", Emphasis::Doubtful.on("guessed"));
@@ -181,6 +220,8 @@ pub(crate) struct RobotMade<'a> {
     joints: Vec<Option<&'a str>>,
     notes: &'a [String],
     guesses: &'a [String],
+    /// The file next to the URDF that compliances and sections are from.
+    compliances_from: Option<PathBuf>,
 }
 
 impl<'a> RobotMade<'a> {
@@ -194,6 +235,7 @@ impl<'a> RobotMade<'a> {
             joints: spec.joints.iter().map(|j| j.name.as_deref()).collect(),
             notes: &made.robot.notes,
             guesses: &spec.guesses,
+            compliances_from: made.robot.beside.as_ref().map(|_| beside(&made.urdf)),
         }
     }
 }

@@ -1,20 +1,26 @@
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
 use serde::Serialize;
 
-use crate::Result;
 use crate::analysis::{FreedLinks, StructureAnalysis};
-use crate::campaign::{Campaign, LinkGroup};
+use crate::campaign::robot_text::RobotComments;
+use crate::campaign::{Campaign, LinkGroup, campaign_file};
 use crate::commands::document::FitFound;
 use crate::commands::next_step::Guide;
-use crate::commands::text::{Emphasis, files_first, percent, table, warnings_but};
+use crate::commands::text::{Emphasis, files_first, number, percent, table, warnings_but};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::comparison::place::DominantRegion;
 use crate::discrepancy::setup::SetupFinding;
+use crate::files::write_new;
 use crate::identify::frfs::modal_start::ModalStart;
 use crate::identify::{Calibration, Options, Scale, StructureCase, StructureModel, Undetermined};
 use crate::report::number::{format_si, plus_minus};
 use crate::report::words::parameter_of;
 use crate::revision::Side;
+use crate::text::{listed, quoted, shell_word};
+use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
 pub struct CalibrateArgs {
@@ -39,6 +45,9 @@ pub struct CalibrateArgs {
         conflicts_with = "from_nominal"
     )]
     free: Vec<Free>,
+    /// Write the robot with the link parameters that --free found into a robot file in the campaign's folder.
+    #[arg(long, value_name = "FILE", requires = "free")]
+    write_robot: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -66,6 +75,8 @@ impl Free {
 
 pub fn run(args: CalibrateArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
+    let new_file = args.write_robot.as_deref();
+    let new_file = new_file.map(|path| RobotFile::new(&campaign, path)).transpose()?;
     let options = Options {
         extra_starts: args.starts,
         seed: args.seed,
@@ -103,6 +114,13 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         Some(freed) => freed.undetermined.clone(),
         None => Undetermined::new(&case.model.parameters, calibration)?,
     };
+    let written = match (&freed, &new_file) {
+        (Some(freed), Some(file)) if !freed.departing.is_empty() => {
+            file.write(&campaign, freed)?;
+            Some(file)
+        }
+        _ => None,
+    };
     let document = Document {
         domain: Side::Structure,
         revision: case.revision(),
@@ -113,7 +131,7 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
         error_before: before.totals,
         modal_start: start.as_ref(),
         undetermined: &undetermined,
-        freed: freed.as_ref().map(WithFreed::of),
+        freed: freed.as_ref().map(|freed| WithFreed::of(freed, written)),
         setup: &setup.findings,
         warnings: notes,
     };
@@ -148,19 +166,31 @@ pub fn run(args: CalibrateArgs) -> Result<Outcome> {
                  nrms rise\n";
     }
     if let Some(freed) = &freed {
-        text += &describe_freed(freed);
+        text += &describe_freed(&campaign, freed, &args);
+        if let Some(file) = written {
+            text += &file.told(&campaign);
+        } else if let Some(file) = &new_file {
+            text += &format!(
+                "{} was not written: nothing in it would differ\n",
+                file.path.display()
+            );
+        }
     }
     for sentence in undetermined.in_words() {
         text += &format!("{sentence}\n");
     }
     text += &warnings_but(notes, &case.warnings);
-    let next = Guide::structure(&campaign).calibrated(
-        calibration.converged(),
-        args.starts,
-        calibration.reduced_chi2,
-        &after.totals,
-        after.mostly.as_ref().map(DominantRegion::words),
-    );
+    let guide = Guide::structure(&campaign);
+    let next = match &freed {
+        Some(freed) if !freed.is_believable() => guide.imitated(),
+        _ => guide.calibrated(
+            calibration.converged(),
+            args.starts,
+            calibration.reduced_chi2,
+            &after.totals,
+            after.mostly.as_ref().map(DominantRegion::words),
+        ),
+    };
     Ok(Outcome::new(document, text, Some(next)))
 }
 
@@ -192,10 +222,13 @@ struct WithFreed<'a> {
     held_out_nrms_before: Option<f64>,
     held_out_nrms_after: Option<f64>,
     is_progress: Option<bool>,
+    at_end_of_range: Vec<&'a str>,
+    is_believable: bool,
+    robot_file: Option<&'a Path>,
 }
 
 impl<'a> WithFreed<'a> {
-    fn of(freed: &'a FreedLinks) -> Self {
+    fn of(freed: &'a FreedLinks, written: Option<&'a RobotFile>) -> Self {
         let held_out = freed.held_out.as_ref();
         WithFreed {
             groups: freed.groups.iter().map(|g| g.key()).collect(),
@@ -205,21 +238,140 @@ impl<'a> WithFreed<'a> {
             held_out_nrms_before: held_out.map(|[before, _]| before.nrms()),
             held_out_nrms_after: held_out.map(|[_, after]| after.nrms()),
             is_progress: freed.progress,
+            at_end_of_range: freed.at_end_of_range(),
+            is_believable: freed.is_believable(),
+            robot_file: written.map(|file| file.path.as_path()),
         }
     }
 }
 
+/// The robot file that `--write-robot` names.
+struct RobotFile {
+    path: PathBuf,
+    /// As `campaign.toml` refers to it.
+    name: String,
+}
+
+impl RobotFile {
+    /// Checked before anything is fitted.
+    fn new(campaign: &Campaign, path: &Path) -> Result<Self> {
+        let wrong = |what: &str, remedy: String| {
+            let error = InputError::new(what).file(path).key("--write-robot");
+            Err(error.remedy(remedy).into())
+        };
+        let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned());
+        let Some(file_name) = file_name else {
+            return wrong("is no name of a file", "give the path of a new robot file".into());
+        };
+        let in_folder = campaign.dir.join(&file_name);
+        let folder = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
+        let inside = folder.canonicalize().ok().zip(campaign.dir.canonicalize().ok());
+        let Some(inside) =
+            inside.and_then(|(folder, dir)| folder.strip_prefix(dir).map(Path::to_path_buf).ok())
+        else {
+            return wrong(
+                "is not in the campaign's folder, and a campaign names no robot file elsewhere",
+                format!("--write-robot {}", shell_word(&in_folder)),
+            );
+        };
+        if path.symlink_metadata().is_ok() {
+            return Err(Self::taken(path));
+        }
+        Ok(RobotFile {
+            path: path.to_path_buf(),
+            name: inside.join(file_name).to_string_lossy().replace('\\', "/"),
+        })
+    }
+
+    fn taken(path: &Path) -> Error {
+        InputError::new("is there already; nothing was written")
+            .file(path)
+            .key("--write-robot")
+            .remedy("give another name, or take the file away")
+            .into()
+    }
+
+    fn write(&self, campaign: &Campaign, freed: &FreedLinks) -> Result<()> {
+        let before = campaign
+            .robot
+            .as_ref()
+            .map_or("the robot file", |robot| &robot.model);
+        let [was, is] = [&freed.before, &freed.after].map(|fit| percent(fit.after.totals.nrms));
+        let judged = match (freed.is_believable(), freed.progress) {
+            (false, _) => {
+                " These values cannot be believed: some stand at the end of their range, and far more than noise is left."
+            }
+            (true, Some(false)) => {
+                " Postures left out of the fit are predicted no better than chance would make it."
+            }
+            _ => "",
+        };
+        let robot = freed.robot();
+        let mut about = RobotComments {
+            head: vec![
+                format!(
+                    "Made by lobestone of {before}: link parameters fitted to the FRFs of {} (error {was} -> {is}).{judged}",
+                    campaign.name
+                ),
+                format!(
+                    "Joint compliances and all else are those of {before}; calibrate fits the joints anew."
+                ),
+            ],
+            joints: vec![Vec::new(); robot.joints.len()],
+            links: vec![Vec::new(); robot.links.len()],
+            compliance: None,
+        };
+        for p in freed.departures() {
+            let (of, number) = p.name.split_once('.').unwrap_or((&p.name, ""));
+            let told = format!(
+                "{number} fitted: {}; {} in {before}",
+                plus_minus(p.value, p.std_error, p.unit),
+                format_si(p.initial, p.unit, 4)
+            );
+            let index = |kind: &str| of.strip_prefix(kind)?.parse::<usize>().ok()?.checked_sub(1);
+            let place = match (index("joint-"), index("link-")) {
+                (Some(i), _) => about.joints.get_mut(i),
+                (_, Some(i)) => about.links.get_mut(i),
+                _ => None,
+            };
+            place.unwrap_or(&mut about.head).push(told);
+        }
+        match write_new(&self.path, robot.to_toml(&about).as_bytes())? {
+            true => Ok(()),
+            false => Err(Self::taken(&self.path)),
+        }
+    }
+
+    fn told(&self, campaign: &Campaign) -> String {
+        format!(
+            "written: {}; to use it, put model = {} into [robot] of {}: `calibrate` comes to the same error then\n",
+            self.path.display(),
+            quoted(&self.name),
+            campaign_file(&campaign.dir).display()
+        )
+    }
+}
+
 /// What freeing link parameters did to the error, and how to keep it.
-fn describe_freed(freed: &FreedLinks) -> String {
+fn describe_freed(campaign: &Campaign, freed: &FreedLinks, args: &CalibrateArgs) -> String {
     if freed.departing.is_empty() {
         return format!(
             "\nall {} link parameters that were free agree with the robot file within their errors: leave them as they are\n",
             freed.freed
         );
     }
+    let dir = shell_word(&campaign.dir);
+    let believable = freed.is_believable();
+    let verb = match believable && freed.progress != Some(false) {
+        true => "cannot be what the robot file says",
+        false => "fit better with other values than the robot file's",
+    };
     let mut text = format!(
-        "\nof {} link parameters that were free {} cannot be what the robot file says: {}; the others agree with it and were left \
-         alone\nwith the links as in the robot file the error was {}",
+        "\nof {} link parameters that were free {} {verb}: {}; the others agree with it and were left alone\nwith the links as in the \
+         robot file the error was {}",
         freed.freed,
         freed.departing.len(),
         freed.departing.join(", "),
@@ -232,13 +384,41 @@ fn describe_freed(freed: &FreedLinks) -> String {
             percent(after.nrms())
         );
     }
+    if !believable {
+        let ends: Vec<String> = freed.at_end_of_range().into_iter().map(str::to_string).collect();
+        let stand = match ends.len() {
+            1 => "stands at the end of its range",
+            _ => "stand at the end of their range",
+        };
+        let rigid = match freed.after.case.bends() {
+            true => "",
+            false => " (its links are rigid: where the real ones bend, `link-flexibility` is missing)",
+        };
+        return text
+            + &format!(
+                "\nthese values cannot be believed: {} {stand}, and the misfit is still {} times that of noise. Links imitate what the model \
+                 does not have{rigid}: leave them as they are, and see what `lobestone diagnose {dir}` finds missing\n",
+                listed(&ends),
+                number(freed.after.calibration.reduced_chi2, 2)
+            );
+    }
     text += match freed.progress {
         Some(true) => ", better by more than chance\n",
         Some(false) => ", no better than chance would make it: leave them as they are\n",
         None => "\n",
     };
-    if freed.progress != Some(false) {
-        text += "to keep them, give the campaign a robot file of its own with these values (docs/files.md)\n";
+    if freed.progress != Some(false) && args.write_robot.is_none() {
+        let groups: Vec<String> = args
+            .free
+            .iter()
+            .filter_map(ValueEnum::to_possible_value)
+            .map(|v| v.get_name().to_string())
+            .collect();
+        text += &format!(
+            "to keep them, write a robot file: `lobestone calibrate {dir} --free {} --write-robot {}`\n",
+            groups.join(","),
+            shell_word(&campaign.dir.join("robot-fitted.toml"))
+        );
     }
     text
 }

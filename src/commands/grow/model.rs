@@ -9,12 +9,14 @@ use crate::campaign::Campaign;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
+use crate::effects::LINK_FLEXIBILITY;
 use crate::files::write_new;
 use crate::identify::{Options, StructureModel};
 use crate::lobes::drilling::contact::held_report;
+use crate::robot::model::NOMINAL_DAMPING_RATIO;
 use crate::robot::rigid::STANDARD_GRAVITY;
 use crate::robot::urdf::{self, Sources};
-use crate::robot::{Baseline, Dual, PostureReport, export};
+use crate::robot::{Baseline, Dual, PostureReport, RobotModel, export};
 use crate::{Error, InputError, Result};
 
 #[derive(clap::Args)]
@@ -27,7 +29,7 @@ pub struct ModelArgs {
     /// Let the links bend with this Young's modulus (rigid links if left out; --matrices takes 200e9 then).
     #[arg(long, value_name = "PA")]
     young_pa: Option<f64>,
-    /// Write the robot with its masses (calibrated where there are FRFs) as a URDF, and the compliances into a file next to it.
+    /// Write the robot (calibrated where there are FRFs) as a URDF, and its compliances and sections into a file next to it.
     #[arg(long, value_name = "FILE")]
     urdf: Option<PathBuf>,
 }
@@ -51,7 +53,7 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
         model.robot.spec.name,
         describe(&nominal)
     );
-    let mut sources = of_robot_file(&model);
+    let (mut robot, mut sources) = of_robot_file(&model);
     let mut calibrated = None;
     let notes: Vec<String>;
     if !campaign.frfs.is_empty() {
@@ -65,19 +67,21 @@ pub fn run(args: ModelArgs) -> Result<Outcome> {
         );
         text += &describe(&after);
         notes = case.warnings.iter().cloned().chain(left_out).collect();
-        sources = of_calibrated(&campaign, &case.model, &calibration.theta, case.effects());
+        (robot, sources) = of_calibrated(&campaign, &case.model, &calibration.theta, case.effects());
         calibrated = Some(AfterCalibration {
             calibrated_postures: after,
             revision: case.revision(),
             effects: case.effects(),
         });
     } else {
-        notes = model.robot.spec.guesses_told().chain(left_out).collect();
+        let told = campaign.beyond_limits.iter().cloned();
+        let told = told.chain(model.robot.spec.guesses_told());
+        notes = told.chain(left_out).collect();
     }
     text += &warnings(&notes);
     let mut written = None;
     if let Some(file) = &args.urdf {
-        let files = write_urdf(file, &model, &sources)?;
+        let files = write_urdf(file, &robot, &sources)?;
         text += &format!(
             "\nwritten: {} and {} ({})\n",
             files[0].display(),
@@ -176,41 +180,42 @@ struct Matrices {
     m_c: Vec<Vec<f64>>,
 }
 
-fn of_robot_file(model: &StructureModel) -> Sources {
-    let baseline = Baseline::nominal(&model.robot.spec);
-    of_baseline(&baseline, "the robot file, not calibrated".into(), Vec::new())
+/// The robot file's robot, and where its values are from.
+fn of_robot_file(model: &StructureModel) -> (RobotModel, Sources) {
+    let sources = Sources {
+        source: "the robot file, not calibrated".into(),
+        damping_ratio: NOMINAL_DAMPING_RATIO,
+        young_pa: None,
+        left_out: Vec::new(),
+    };
+    (model.robot.clone(), sources)
 }
 
-fn of_baseline(baseline: &Baseline, source: String, left_out: Vec<String>) -> Sources {
-    let stiffness = baseline.joint_stiffness_nm_per_rad.iter();
-    Sources {
-        source,
-        mass_scale: baseline.mass_scale.iter().map(|scale| scale.value).collect(),
-        compliance_rad_per_nm: stiffness.map(|k| 1.0 / k.value).collect(),
-        damping_ratio: baseline.damping_ratio.value,
-        young_pa: baseline.young_pa.as_ref().map(|young| young.value),
-        left_out,
-    }
-}
-
+/// The robot as calibrated: all that was tuned of it, lengths and inertias as well as masses and compliances.
 fn of_calibrated(
     campaign: &Campaign,
     model: &StructureModel,
     theta: &[f64],
     effects: Vec<String>,
-) -> Sources {
-    let source = format!("calibrated on the FRFs of {}", campaign.name);
-    let held = |effect: &String| effect.starts_with("link-flexibility");
-    let beyond = effects.into_iter().filter(|effect| !held(effect));
-    of_baseline(&model.baseline(theta, false), source, beyond.collect())
+) -> (RobotModel, Sources) {
+    let mut robot = model.robot_as_fitted(theta);
+    robot.spec.forget_guessed_compliances();
+    let held = |effect: &String| effect == LINK_FLEXIBILITY;
+    let sources = Sources {
+        source: format!("calibrated on the FRFs of {}", campaign.name),
+        damping_ratio: model.baseline(theta, false).damping_ratio.value,
+        young_pa: model.young_pa(theta),
+        left_out: effects.into_iter().filter(|effect| !held(effect)).collect(),
+    };
+    (robot, sources)
 }
 
 /// The URDF and what it cannot hold in a file next to it: `robot.urdf`, `robot.compliances.toml`.
-fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<[PathBuf; 2]> {
-    let beside = file.with_extension("compliances.toml");
+fn write_urdf(file: &Path, robot: &RobotModel, sources: &Sources) -> Result<[PathBuf; 2]> {
+    let beside = urdf::beside(file);
     let texts = [
-        (file, urdf::urdf(&model.robot, sources)),
-        (beside.as_path(), urdf::compliances(&model.robot.spec, sources)),
+        (file, urdf::urdf(robot, sources)),
+        (beside.as_path(), urdf::compliances(&robot.spec, sources)),
     ];
     let taken = |there: &Path| -> Error {
         InputError::new("is there already; nothing was written")
@@ -238,7 +243,7 @@ fn write_urdf(file: &Path, model: &StructureModel, sources: &Sources) -> Result<
 
 /// Young's modulus that the user asked for, where the model does not bring its own.
 fn young_pa(model: &StructureModel, args: &ModelArgs) -> Result<Option<f64>> {
-    if !model.has("link-flexibility") {
+    if !model.has(LINK_FLEXIBILITY) {
         return Ok(args.young_pa);
     }
     match args.young_pa {
@@ -262,6 +267,7 @@ fn postures(
 ) -> Result<Vec<PostureTold>> {
     let mut baseline = model.baseline(theta, false);
     baseline.young_pa = young_pa(model, args)?.map(Dual::constant);
+    let robot = model.robot_as_fitted(theta);
     campaign
         .postures
         .iter()
@@ -269,20 +275,16 @@ fn postures(
             let kinematics = model.robot.kinematics(&posture.joints_deg)?;
             let chain =
                 |baseline: &Baseline| model.chain_on(baseline, theta, &kinematics, Default::default(), false);
-            let report = PostureReport::new(&model.robot, &kinematics, &chain(&baseline))?;
+            let fitted = robot.kinematics(&posture.joints_deg)?;
+            let report = PostureReport::new(&robot, &fitted, &chain(&baseline))?;
             let held = match campaign.contacts.as_slice() {
                 [] => None,
-                contacts => Some(held_report(
-                    &model.robot,
-                    &kinematics,
-                    &chain(&baseline),
-                    contacts,
-                )?),
+                contacts => Some(held_report(&robot, &fitted, &chain(&baseline), contacts)?),
             };
             let mut matrices = None;
             if args.matrices {
                 let mut bending = baseline.clone();
-                if !model.has("link-flexibility") {
+                if !model.has(LINK_FLEXIBILITY) {
                     bending.young_pa.get_or_insert_with(|| Dual::constant(STEEL_PA));
                 }
                 let mut chain = chain(&bending);
@@ -308,8 +310,8 @@ fn postures(
                 tcp_m: report.tcp_m,
                 tool_axis: report.tool_axis,
                 free: Dynamics::of(report),
-                centre_of_mass_m: model.robot.centre_of_mass(&kinematics).map(|c| [c.x, c.y, c.z]),
-                gravity_torques_nm: model.robot.gravity_torques_nm(&kinematics, down),
+                centre_of_mass_m: robot.centre_of_mass(&fitted).map(|c| [c.x, c.y, c.z]),
+                gravity_torques_nm: robot.gravity_torques_nm(&fitted, down),
                 held: held.map(Dynamics::of),
                 matrices,
             })

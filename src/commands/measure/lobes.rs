@@ -307,6 +307,7 @@ mod tests {
             date: None,
             robot: None,
             postures: vec![],
+            beyond_limits: vec![],
             points: vec![],
             frfs: vec![],
             tool: None,

@@ -5,19 +5,23 @@ use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
 use crate::effects::{Background, Size};
 use crate::parameter::{Parameter, Prior, Scale};
+use crate::robot::model::NOTHING_BENDS_PA;
 use crate::robot::{Chain, Dual};
 
-/// Links bend: every link a beam of its section, one common Young's modulus.
+/// How the effect is called.
+pub const LINK_FLEXIBILITY: &str = "link-flexibility";
+
+/// Links bend: every link a beam of its section, one common Young's modulus where the robot file gives it none of its own.
 pub struct LinkFlexibility;
 
 impl Effect<Structure> for LinkFlexibility {
     fn id(&self) -> &'static str {
-        "link-flexibility"
+        LINK_FLEXIBILITY
     }
 
     fn explanation(&self) -> &'static str {
-        "The links are not rigid: each bends, twists and stretches as a hollow beam of its section, all with one Young's \
-         modulus."
+        "The links are not rigid: each bends, twists and stretches as a beam of its section, all with one Young's modulus, but for \
+         those that the robot file gives one of their own."
     }
 
     fn fingerprint(&self) -> &'static str {
@@ -64,7 +68,7 @@ impl Effect<Structure> for LinkFlexibility {
                 mean: 150e9f64.ln(),
                 std: 2.0,
             }),
-            bounds: [2e9, 2e13],
+            bounds: [2e9, NOTHING_BENDS_PA],
         }]
     }
 

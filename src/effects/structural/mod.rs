@@ -18,3 +18,4 @@ pub(crate) mod time_delay;
 pub(crate) mod tool_flexibility;
 
 pub use domain::{ChannelFilter, Conditions, DataSummary, PostureSetting, Structure};
+pub use link_flexibility::LINK_FLEXIBILITY;

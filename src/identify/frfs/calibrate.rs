@@ -229,7 +229,7 @@ impl Calibration {
 }
 
 /// Misfit from which on the user is told.
-const FAR_ABOVE_NOISE: f64 = 1.5;
+pub(crate) const FAR_ABOVE_NOISE: f64 = 1.5;
 /// Misfit above which noise alone is not credible any more and further starting points are tried.
 const SUSPICIOUS_CHI2: f64 = 1.15;
 /// Complex values on which starting points are followed, about; and those on which they are compared only.

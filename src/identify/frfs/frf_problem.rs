@@ -263,8 +263,9 @@ pub(super) mod tests {
     use super::*;
     use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
     use crate::effects::{self, Registry, Spot};
-    use crate::robot::RobotModel;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
+    use crate::robot::frf::natural_frequencies_hz;
+    use crate::robot::{Baseline, RobotModel};
 
     fn section() -> RobotSection {
         RobotSection {
@@ -477,6 +478,43 @@ pub(super) mod tests {
         );
         for (a, b) in a.iter().flatten().zip(b.iter().flatten()) {
             assert!((a - b).norm() < 1e-9 * a.norm(), "{a} {b}");
+        }
+    }
+
+    /// The robot as fitted, written down, is the model where it stands: with its own values as the robot file's nothing moves.
+    #[test]
+    fn the_robot_as_fitted_is_the_model() {
+        let exact = model();
+        for section in [section().freeing(&crate::data::LinkGroup::ALL), {
+            let masses = [crate::data::LinkGroup::Masses];
+            section().freeing(&masses)
+        }] {
+            let free = StructureModel::new(exact.robot.clone(), exact.points.clone(), &section);
+            let theta: Vec<f64> = free
+                .parameters
+                .iter()
+                .enumerate()
+                .map(|(i, p)| {
+                    let off = 1.0 + 0.04 * ((i % 5) as f64 - 2.0);
+                    match p.unit {
+                        "m" => p.internal(p.nominal + 0.01 * ((i % 3) as f64 - 1.0)),
+                        "1" => p.internal(p.nominal),
+                        _ => p.internal(p.nominal * off),
+                    }
+                })
+                .collect();
+            let written = free.robot_as_fitted(&theta);
+            for posture in &TAP_POSTURES {
+                let kinematics = exact.robot.kinematics(posture).unwrap();
+                let chain = free.chain(&theta, &kinematics, Default::default(), false);
+                let expected = natural_frequencies_hz(&chain.system(0)).unwrap();
+                let kinematics = written.kinematics(posture).unwrap();
+                let chain = written.chain(&kinematics, &Baseline::nominal(&written.spec));
+                let found = natural_frequencies_hz(&chain.system(0)).unwrap();
+                for (e, f) in expected.iter().zip(&found) {
+                    approx::assert_relative_eq!(e, f, max_relative = 1e-9);
+                }
+            }
         }
     }
 }

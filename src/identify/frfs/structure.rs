@@ -7,10 +7,12 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::data::{Point, RobotSection};
-use crate::effects::{ChannelFilter, Conditions, DataSummary, Known, PostureSetting, Structure};
+use crate::effects::{
+    ChannelFilter, Conditions, DataSummary, Known, LINK_FLEXIBILITY, PostureSetting, Structure,
+};
 use crate::identify::frfs::channels::Channels;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData};
-use crate::identify::model::{Model, Modelled};
+use crate::identify::model::{AddedEffect, Model, Modelled};
 use crate::parameter::{Parameter, Prior, Scale};
 use crate::robot::frf::RowSlopes;
 use crate::robot::model::NOMINAL_DAMPING_RATIO;
@@ -69,11 +71,12 @@ fn file_parameter(robot: &RobotModel, number: FileNumber, tolerance: f64) -> Par
             [nominal / INERTIA_FACTOR, nominal * INERTIA_FACTOR],
         ),
         FileNumber::Wall { link } => {
-            let outer = robot.spec.links[link - 1]
-                .section
-                .map_or(f64::INFINITY, |s| s.outer_diameter_m);
+            let section = robot.spec.links[link - 1].section;
+            let thickest = section
+                .and_then(|s| s.shape.thickest_wall_m())
+                .unwrap_or(f64::INFINITY);
             // A solid bar has no thicker wall.
-            let most = (nominal * WALL_FACTOR).min(0.499 * outer);
+            let most = (nominal * WALL_FACTOR).min(0.998 * thickest);
             (Scale::Logarithmic, [nominal / WALL_FACTOR, most.max(nominal)])
         }
         _ => (
@@ -210,6 +213,55 @@ impl StructureModel {
         Cow::Owned(robot)
     }
 
+    /// The whole robot as it is at `theta`: joints, masses and all other numbers of its file that are tuned. Its nominal baseline is
+    /// [`baseline`](Self::baseline) at `theta`, but for the damping.
+    pub fn robot_as_fitted(&self, theta: &[f64]) -> RobotModel {
+        let mut robot = self.robot_with(theta, |_| true);
+        for (i, joint) in robot.spec.joints.iter_mut().enumerate() {
+            joint.compliance_rad_per_nm = 1.0 / self.parameters[i].natural(theta[i]);
+        }
+        robot
+    }
+
+    /// The robot file's robot with those link parameters as they are at `theta` that `kept` says of by name; joints stay as in the file.
+    pub fn robot_with(&self, theta: &[f64], kept: impl Fn(&str) -> bool) -> RobotModel {
+        let mut robot = self.robot.clone();
+        let value = |i: usize| {
+            let parameter = &self.parameters[i];
+            kept(&parameter.name).then(|| parameter.natural(theta[i]))
+        };
+        for (link, parameter) in robot.spec.links.iter_mut().zip(&self.masses) {
+            let Some(mass_kg) = parameter.and_then(value).filter(|_| link.mass_kg > 0.0) else {
+                continue;
+            };
+            if !self.tunes_inertia() {
+                let factor = mass_kg / link.mass_kg;
+                link.inertia_kg_m2 = link.inertia_kg_m2.map(|moment| factor * moment);
+                link.products_kg_m2 = link.products_kg_m2.map(|product| factor * product);
+            }
+            link.mass_kg = mass_kg;
+        }
+        for (k, number) in self.file_numbers.iter().enumerate() {
+            if let Some(value) = value(self.first_file_number + k) {
+                number.set(&mut robot, value);
+            }
+        }
+        robot
+    }
+
+    /// Whether moments of inertia are tuned for themselves; they follow the masses otherwise.
+    fn tunes_inertia(&self) -> bool {
+        let inertia = |number: &FileNumber| matches!(number, FileNumber::Inertia { .. });
+        self.file_numbers.iter().any(inertia)
+    }
+
+    /// Young's modulus of the links at `theta`, Pa; `None` where the model has none that bend.
+    pub fn young_pa(&self, theta: &[f64]) -> Option<f64> {
+        let bending = |added: &&AddedEffect<Structure>| added.instance.label() == LINK_FLEXIBILITY;
+        let added = self.effects().iter().find(bending)?;
+        Some(self.parameters[added.parameters.start].natural(theta[added.parameters.start]))
+    }
+
     /// Where the frames are at `theta`, where `kinematics` says where the robot file puts them.
     pub fn kinematics_at<'k>(&self, theta: &[f64], kinematics: &'k Kinematics) -> Cow<'k, Kinematics> {
         self.at(theta, kinematics).1
@@ -252,8 +304,7 @@ impl StructureModel {
     ) -> Chain {
         let (robot, kinematics) = self.at(theta, kinematics);
         let mut chain = robot.chain(&kinematics, baseline);
-        let inertia = |number: &FileNumber| matches!(number, FileNumber::Inertia { .. });
-        if self.file_numbers.iter().any(inertia) {
+        if self.tunes_inertia() {
             for body in &mut chain.bodies {
                 body.inertia_follows_mass = false;
             }

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::data::{LinkTolerances, MeasuredFrf, Point, Posture, RobotSection};
-use crate::effects::Structure;
+use crate::effects::{LINK_FLEXIBILITY, Structure};
 use crate::identify::case::Case;
 use crate::identify::frfs::calibrate::Options;
 use crate::identify::frfs::frf_data::FrfData;
@@ -47,7 +47,7 @@ impl StructureCase {
 
     /// Whether the links of the model bend.
     pub fn bends(&self) -> bool {
-        self.model.has("link-flexibility")
+        self.model.has(LINK_FLEXIBILITY)
     }
 
     /// How to calibrate this case where `wanted` was asked for. Further starting points were tried when the revision was

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 use std::fmt::Write;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
-use crate::data::{JointSpec, RobotSpec};
+use crate::campaign::robot_text::section_text;
+use crate::data::{BeamSection, JointSpec, RobotSpec};
 use crate::robot::kinematics::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
 use crate::text::{quoted, to_degrees, xml_escaped};
@@ -15,13 +16,9 @@ use crate::text::{quoted, to_degrees, xml_escaped};
 pub struct Sources {
     /// For people: `calibrated on …`, `the robot file, not calibrated`.
     pub source: String,
-    /// Factor on each link's mass and inertia.
-    pub mass_scale: Vec<f64>,
-    /// One a joint.
-    pub compliance_rad_per_nm: Vec<f64>,
     /// One damping ratio for all modes.
     pub damping_ratio: f64,
-    /// Young's modulus of the links where they bend.
+    /// Common Young's modulus of the links where they bend.
     pub young_pa: Option<f64>,
     /// What the model has that neither file holds.
     pub left_out: Vec<String>,
@@ -35,16 +32,41 @@ fn behind_axis(joint: &JointSpec) -> Isometry3<f64> {
     }
 }
 
-/// Names with what XML would misread replaced, each only once.
-struct Names(HashSet<String>);
+/// What links and joints are called, in both files: each name only once.
+struct Names {
+    base: String,
+    links: Vec<String>,
+    tool: String,
+    joints: Vec<String>,
+    tool_joint: String,
+}
 
 impl Names {
-    fn new_one(&mut self, wanted: &str) -> String {
-        let mut name = xml_escaped(wanted);
-        while !self.0.insert(name.clone()) {
-            name.push('_');
+    fn new(spec: &RobotSpec) -> Self {
+        fn new_one(taken: &mut HashSet<String>, wanted: &str) -> String {
+            let mut name = wanted.to_string();
+            while !taken.insert(name.clone()) {
+                name.push('_');
+            }
+            name
         }
-        name
+        let (mut links, mut joints) = (HashSet::new(), HashSet::new());
+        let base = new_one(&mut links, "base_link");
+        let own = |name: &Option<String>, kind: &str, i: usize| {
+            name.clone().unwrap_or_else(|| format!("{kind}_{}", i + 1))
+        };
+        let link_names = spec.links.iter().enumerate();
+        let link_names = link_names.map(|(i, link)| new_one(&mut links, &own(&link.name, "link", i)));
+        let link_names = link_names.collect();
+        let joint_names = spec.joints.iter().enumerate();
+        let joint_names = joint_names.map(|(i, joint)| new_one(&mut joints, &own(&joint.name, "joint", i)));
+        Names {
+            base,
+            links: link_names,
+            tool: new_one(&mut links, "tool0"),
+            joints: joint_names.collect(),
+            tool_joint: new_one(&mut joints, "tool0_joint"),
+        }
     }
 }
 
@@ -61,16 +83,15 @@ fn origin(pose: &Isometry3<f64>) -> String {
     )
 }
 
-/// The robot as the text of a URDF: links at their joints' axes, with mass, centre of mass and inertia times
-/// `sources.mass_scale`; the tool frame is the link `tool0`.
+/// The robot as the text of a URDF: links at their joints' axes, with mass, centre of mass and inertia; the tool frame is the link
+/// `tool0`.
 pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
     let spec = &robot.spec;
     let zero = Kinematics::new(spec, &vec![0.0; spec.joints.len()]);
-    let mut links = Names(HashSet::new());
-    let mut joints = Names(HashSet::new());
-    let base = links.new_one("base_link");
+    let names = Names::new(spec);
+    let base = xml_escaped(&names.base);
     let mut text = format!(
-        "<?xml version=\"1.0\"?>\n<!-- Written by lobestone. Masses and inertias: {}.\n     Limits of effort and velocity are not \
+        "<?xml version=\"1.0\"?>\n<!-- Written by lobestone. Lengths, masses and inertias: {}.\n     Limits of effort and velocity are not \
          known here and stand as 0. -->\n<robot name=\"{}\">\n  <link name=\"{base}\"/>\n",
         xml_escaped(&sources.source).replace("--", "- -"),
         xml_escaped(&spec.name)
@@ -78,8 +99,8 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
     let mut parent = base;
     let mut behind = Isometry3::identity();
     for (i, (joint, link)) in spec.joints.iter().zip(&spec.links).enumerate() {
-        let child = links.new_one(link.name.as_deref().unwrap_or(&format!("link_{}", i + 1)));
-        let name = joints.new_one(joint.name.as_deref().unwrap_or(&format!("joint_{}", i + 1)));
+        let child = xml_escaped(&names.links[i]);
+        let name = xml_escaped(&names.joints[i]);
         let (own, axis) = match &joint.placement {
             Some(placement) => (placement.frame(), placement.axis),
             None => (Isometry3::identity(), [0.0, 0.0, 1.0]),
@@ -105,15 +126,14 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
         }
         let com = behind * zero.frames[i + 1].inverse_transform_point(&robot.link_com(&zero, i + 1));
         let turn = behind.rotation.to_rotation_matrix().into_inner();
-        let scale = sources.mass_scale[i];
-        let j = turn * link.inertia_tensor() * turn.transpose() * scale;
+        let j = turn * link.inertia_tensor() * turn.transpose();
         let _ = write!(
             text,
             "  </joint>\n  <link name=\"{child}\">\n    <inertial>\n      <origin xyz=\"{}\" rpy=\"0 0 0\"/>\n      <mass \
              value=\"{:?}\"/>\n      <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" iyz=\"{:?}\" \
              izz=\"{:?}\"/>\n    </inertial>\n  </link>\n",
             numbers(com.coords.iter()),
-            link.mass_kg * scale,
+            link.mass_kg,
             j[(0, 0)],
             j[(0, 1)],
             j[(0, 2)],
@@ -123,18 +143,19 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
         );
         parent = child;
     }
-    let tool = links.new_one("tool0");
+    let tool = xml_escaped(&names.tool);
     let _ = write!(
         text,
         "  <joint name=\"{}\" type=\"fixed\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"{tool}\"/>\n  \
          </joint>\n  <link name=\"{tool}\"/>\n</robot>\n",
-        joints.new_one("tool0_joint"),
+        xml_escaped(&names.tool_joint),
         origin(&(behind * spec.tool.in_flange()))
     );
     text
 }
 
-/// What a URDF cannot hold, as TOML: compliance of each joint, damping ratio, Young's modulus.
+/// What a URDF cannot hold, as TOML: compliance of each joint, section of each link, damping ratio, Young's modulus. Links are in the
+/// frames of the URDF.
 pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
     let mut text = format!(
         "# What the URDF next to this file has no place for. Written by lobestone.\nrobot = {}\nsource = {}\n",
@@ -151,17 +172,34 @@ pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
     if let Some(young_pa) = sources.young_pa {
         let _ = writeln!(text, "young_pa = {young_pa:?}");
     }
-    for (i, (joint, compliance)) in spec.joints.iter().zip(&sources.compliance_rad_per_nm).enumerate() {
-        let name = joint.name.clone().unwrap_or(format!("joint_{}", i + 1));
+    let names = Names::new(spec);
+    for (joint, name) in spec.joints.iter().zip(&names.joints) {
         let _ = write!(
             text,
-            "\n[[joint]]\nname = {}\ncompliance_rad_per_nm = {compliance:?}\n",
-            quoted(&name)
+            "\n[[joint]]\nname = {}\ncompliance_rad_per_nm = {:?}\n",
+            quoted(name),
+            joint.compliance_rad_per_nm
         );
         if let Some(limits) = joint.limits_rad {
             let [low, high] = limits.map(to_degrees);
             let _ = writeln!(text, "limits_deg = [{low:?}, {high:?}]");
         }
+    }
+    for ((link, joint), name) in spec.links.iter().zip(&spec.joints).zip(&names.links) {
+        let Some(section) = &link.section else { continue };
+        let axis = section.shape.height_axis().unwrap_or_default();
+        let turned = BeamSection {
+            shape: section
+                .shape
+                .with_height_axis((behind_axis(joint).rotation * Vector3::from(axis)).into()),
+            ..*section
+        };
+        let _ = write!(
+            text,
+            "\n[[link]]\nname = {}\n{}",
+            quoted(name),
+            section_text(&turned)
+        );
     }
     text
 }

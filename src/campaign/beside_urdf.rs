@@ -2,7 +2,10 @@
 //! sections of links.
 
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
 
 use crate::Result;
 use crate::campaign::form::bounds::Bounds;
@@ -10,8 +13,10 @@ use crate::campaign::form::document::Document;
 use crate::campaign::form::keys;
 use crate::campaign::form::section::Section;
 use crate::campaign::robot_file::section;
+use crate::campaign::robot_text::section_text;
 use crate::data::{BeamSection, RobotSpec};
-use crate::text::listed;
+use crate::robot::urdf::{Names, Sources, behind_axis};
+use crate::text::{listed, quoted, to_degrees};
 
 /// Where the file next to a URDF is: `robot.urdf`, `robot.compliances.toml`.
 pub fn beside(urdf: &Path) -> PathBuf {
@@ -66,7 +71,7 @@ impl BesideUrdf {
         }
     }
 
-    /// Gives the robot of the URDF its compliances and sections, by the names of joints and links. `urdf` is what errors call that.
+    /// Gives the robot that was read of the URDF its compliances and sections, by the names of joints and links. `urdf` is what errors call that.
     ///
     /// # Errors
     /// A broken file, and one that knows a joint of the robot not at all or twice; with file, line, key and remedy.
@@ -76,6 +81,7 @@ impl BesideUrdf {
                 .map(|n| n.to_string_lossy().into_owned())
                 .unwrap_or_default()
         };
+        spec.forget_guessed_compliances();
         self.document.parse(&TOP, |top| {
             let joints = by_name(top, "joint", &JOINT)?;
             for joint in &mut spec.joints {
@@ -136,4 +142,165 @@ fn by_name<'d>(top: &Section<'d>, key: &str, keys: &[&str]) -> Result<BTreeMap<S
         all.insert(name, table);
     }
     Ok(all)
+}
+
+/// What a URDF cannot hold, as TOML: compliance of each joint, section of each link, damping ratio, Young's modulus. Links are in the
+/// frames of the URDF.
+pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
+    let mut text = format!(
+        "# What the URDF next to this file has no place for. Written by lobestone.\nrobot = {}\nsource = {}\n",
+        quoted(&spec.name),
+        quoted(&sources.source)
+    );
+    for (key, sentences) in [("guesses", &spec.guesses), ("left_out", &sources.left_out)] {
+        if !sentences.is_empty() {
+            let all: Vec<String> = sentences.iter().map(|s| quoted(s)).collect();
+            let _ = writeln!(text, "{key} = [{}]", all.join(", "));
+        }
+    }
+    let _ = writeln!(text, "damping_ratio = {:?}", sources.damping_ratio);
+    if let Some(young_pa) = sources.young_pa {
+        let _ = writeln!(text, "young_pa = {young_pa:?}");
+    }
+    let names = Names::new(spec);
+    for (joint, name) in spec.joints.iter().zip(&names.joints) {
+        let _ = write!(
+            text,
+            "\n[[joint]]\nname = {}\ncompliance_rad_per_nm = {:?}\n",
+            quoted(name),
+            joint.compliance_rad_per_nm
+        );
+        if let Some(limits) = joint.limits_rad {
+            let [low, high] = limits.map(to_degrees);
+            let _ = writeln!(text, "limits_deg = [{low:?}, {high:?}]");
+        }
+    }
+    for ((link, joint), name) in spec.links.iter().zip(&spec.joints).zip(&names.links) {
+        let Some(section) = &link.section else { continue };
+        let axis = section.shape.height_axis().unwrap_or_default();
+        let turned = BeamSection {
+            shape: section
+                .shape
+                .with_height_axis((behind_axis(joint).rotation * Vector3::from(axis)).into()),
+            ..*section
+        };
+        let _ = write!(
+            text,
+            "\n[[link]]\nname = {}\n{}",
+            quoted(name),
+            section_text(&turned)
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::SectionShape;
+    use crate::robot::fixture::{TAP_POSTURES, irb6640};
+    use crate::robot::frf::natural_frequencies_hz;
+    use crate::robot::urdf::{Request, read, urdf};
+    use crate::robot::{Baseline, Dual, RobotModel};
+
+    fn sources() -> Sources {
+        Sources {
+            source: "calibrated on a test".into(),
+            damping_ratio: 0.02,
+            young_pa: Some(70e9),
+            left_out: Vec::new(),
+        }
+    }
+
+    /// The IRB 6640 with sections of every kind, one turned askew.
+    fn with_sections() -> RobotModel {
+        let mut spec = irb6640();
+        let height_axis = [0.2, 0.9, 0.4];
+        let mut section = BeamSection::tube(0.3, 0.02);
+        section.shape = SectionShape::Box {
+            width_m: 0.2,
+            height_m: 0.3,
+            wall_m: 0.01,
+            height_axis,
+        };
+        spec.links[1].section = Some(section);
+        spec.links[3].section = Some(BeamSection {
+            shape: SectionShape::General {
+                area_m2: 4e-3,
+                second_moment_y_m4: 3e-5,
+                second_moment_z_m4: 1e-5,
+                torsion_constant_m4: 2e-5,
+                height_axis,
+            },
+            young_pa: Some(180e9),
+            shear_pa: Some(60e9),
+        });
+        RobotModel::new(spec)
+    }
+
+    /// Written and read back with the file next to it, a robot has the same frequencies, with links that bend any way, and nothing in it
+    /// is a guess.
+    #[test]
+    fn both_files_together_are_the_robot() {
+        let robot = with_sections();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("out.urdf");
+        let text = urdf(&robot, &sources());
+        std::fs::write(beside(&file), compliances(&robot.spec, &sources())).unwrap();
+        let mut found = read(&file, &text, &Request::default()).unwrap();
+        let said = BesideUrdf::find(&file).unwrap().unwrap();
+        let said = said.apply(&file, &mut found.spec).unwrap();
+        assert_eq!(found.spec.guesses, Vec::<String>::new());
+        assert_eq!(said.file_name, "out.compliances.toml");
+        assert_eq!(said.source.as_deref(), Some("calibrated on a test"));
+        let back = RobotModel::new(found.spec);
+        for posture in &TAP_POSTURES {
+            let frequencies = |robot: &RobotModel| {
+                let mut baseline = Baseline::nominal(&robot.spec);
+                baseline.young_pa = Some(Dual::constant(70e9));
+                let kinematics = robot.kinematics(posture).unwrap();
+                natural_frequencies_hz(&robot.chain(&kinematics, &baseline).system(0)).unwrap()
+            };
+            for (a, b) in frequencies(&robot).iter().zip(&frequencies(&back)).take(12) {
+                approx::assert_relative_eq!(a, b, max_relative = 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_of_another_robot_is_refused() {
+        let robot = RobotModel::new(irb6640());
+        let text = urdf(&robot, &sources());
+        let whole = compliances(&robot.spec, &sources());
+        for (beside_text, words) in [
+            (
+                whole.replace("\"joint_2\"", "\"elbow\""),
+                "says nothing of joint \"joint_2\", which out.urdf has",
+            ),
+            (
+                whole.replace("\"joint_2\"", "\"joint_1\""),
+                "joint[1].name: \"joint_1\" is there twice",
+            ),
+            (
+                whole.replacen("compliance_rad_per_nm = ", "compliance_rad_per_nm = -", 1),
+                "joint[0].compliance_rad_per_nm: is -",
+            ),
+            (whole.replace("[[joint]]", "[[joint"), "not valid TOML"),
+            (whole.replace("section_wall_m", "wall_m"), "unknown key"),
+        ] {
+            let folder = tempfile::tempdir().unwrap();
+            let file = folder.path().join("out.urdf");
+            std::fs::write(beside(&file), beside_text).unwrap();
+            let mut found = read(&file, &text, &Request::default()).unwrap();
+            let applied =
+                BesideUrdf::find(&file).and_then(|beside| beside.unwrap().apply(&file, &mut found.spec));
+            let message = applied.unwrap_err().to_string();
+            assert!(
+                message.contains(words)
+                    && message.contains("out.compliances.toml:")
+                    && message.contains("remedy"),
+                "{message}"
+            );
+        }
+    }
 }

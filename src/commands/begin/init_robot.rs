@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::campaign::beside_urdf::{BesideUrdf, SaidBeside, beside};
 use crate::campaign::robot_text::RobotComments;
 use crate::commands::text::Emphasis;
 use crate::data::RobotSpec;
 use crate::files::{write_atomically, write_new};
-use crate::robot::urdf::{BesideUrdf, Request, UrdfRobot, beside, read};
+use crate::robot::urdf::{Request, UrdfRobot, read};
 use crate::text::listed;
 use crate::{Error, InputError, Result};
 
@@ -32,6 +33,8 @@ pub(crate) struct RobotArgs {
 /// A robot from a URDF, and the file that it goes into.
 pub struct MadeRobot {
     robot: UrdfRobot,
+    /// What the file next to the URDF said, where there is one.
+    beside: Option<SaidBeside>,
     urdf: PathBuf,
     /// In the campaign's folder.
     pub file: PathBuf,
@@ -103,9 +106,10 @@ impl MadeRobot {
             base_link: args.base_link.clone(),
             tool_link: args.tool_link.clone(),
             payload_kg: args.payload_kg,
-            beside: BesideUrdf::find(&urdf)?,
         };
-        let robot = read(&urdf, &text, &request)?;
+        let mut robot = read(&urdf, &text, &request)?;
+        let beside = BesideUrdf::find(&urdf)?;
+        let beside = beside.map(|b| b.apply(&urdf, &mut robot.spec)).transpose()?;
         let stem = urdf
             .file_name()
             .map(|n| n.to_string_lossy().into_owned())
@@ -118,6 +122,7 @@ impl MadeRobot {
         let name = format!("{stem}.toml");
         Ok(Some(MadeRobot {
             robot,
+            beside,
             urdf,
             file: folder.join(&name),
             name,
@@ -145,7 +150,7 @@ impl MadeRobot {
         let mut compliance = None;
         head.push(match self.beside() {
             Some(told) => {
-                compliance = self.robot.beside.as_ref().map(|said| format!("from {}", said.file_name));
+                compliance = self.beside.as_ref().map(|said| format!("from {}", said.file_name));
                 format!("{told} Damping starts at 3 %, drives are not modelled.")
             }
             None => "Compliances, damping and the inertia of the drives are not in a URDF: compliances are guesses here, damping starts \
@@ -172,7 +177,7 @@ impl MadeRobot {
 
     /// What the file next to the URDF gave, in sentences; `None` where there is none.
     fn beside(&self) -> Option<String> {
-        let said = self.robot.beside.as_ref()?;
+        let said = self.beside.as_ref()?;
         let source = said.source.as_ref().map_or(String::new(), |s| format!(" ({s})"));
         let mut told = format!(
             "Compliances and sections of links are from {}{source}.",
@@ -235,7 +240,7 @@ impl<'a> RobotMade<'a> {
             joints: spec.joints.iter().map(|j| j.name.as_deref()).collect(),
             notes: &made.robot.notes,
             guesses: &spec.guesses,
-            compliances_from: made.robot.beside.as_ref().map(|_| beside(&made.urdf)),
+            compliances_from: made.beside.as_ref().map(|_| beside(&made.urdf)),
         }
     }
 }

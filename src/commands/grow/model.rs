@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::analysis::StructureAnalysis;
 use crate::analysis::structure_case::structure_model;
 use crate::campaign::Campaign;
+use crate::campaign::beside_urdf;
 use crate::commands::next_step::Guide;
 use crate::commands::text::{number, table, warnings};
 use crate::commands::{CampaignArg, Outcome};
@@ -212,10 +213,10 @@ fn of_calibrated(
 
 /// The URDF and what it cannot hold in a file next to it: `robot.urdf`, `robot.compliances.toml`.
 fn write_urdf(file: &Path, robot: &RobotModel, sources: &Sources) -> Result<[PathBuf; 2]> {
-    let beside = urdf::beside(file);
+    let beside = beside_urdf::beside(file);
     let texts = [
         (file, urdf::urdf(robot, sources)),
-        (beside.as_path(), urdf::compliances(&robot.spec, sources)),
+        (beside.as_path(), beside_urdf::compliances(&robot.spec, sources)),
     ];
     let taken = |there: &Path| -> Error {
         InputError::new("is there already; nothing was written")

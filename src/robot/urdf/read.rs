@@ -8,13 +8,12 @@ use urdf_rs::{Joint, JointType, Link, Pose};
 use super::body::RigidBody;
 use super::guess;
 use super::tree::{Tree, kind, turns};
-use crate::campaign::beside_urdf::{BesideUrdf, SaidBeside};
 use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use crate::robot::kinematics::dh::{rotation_of_rpy, rpy_of_rotation};
 use crate::{InputError, Result};
 
 /// What a URDF does not say.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Request {
     /// `None`: the root of the tree.
     pub base_link: Option<String>,
@@ -22,8 +21,6 @@ pub struct Request {
     pub tool_link: Option<String>,
     /// Payload that the maker rates the arm for; `None`: guessed from the mass of its links.
     pub payload_kg: Option<f64>,
-    /// The file next to the URDF with what that has no place for; `None`: compliances are guessed.
-    pub beside: Option<BesideUrdf>,
 }
 
 /// A robot from a URDF.
@@ -37,8 +34,6 @@ pub struct UrdfRobot {
     pub tool_link: String,
     /// What was decided, for people: frames, links taken together, joints held.
     pub notes: Vec<String>,
-    /// What the file next to the URDF said, where there is one.
-    pub beside: Option<SaidBeside>,
 }
 
 /// Elements within each other; a robot has about five.
@@ -126,16 +121,9 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
                 .into(),
         );
     }
-    let beside = match &request.beside {
-        Some(beside) => Some(beside.apply(file, &mut spec)?),
-        None => {
-            guess::compliances(&mut spec, request.payload_kg);
-            None
-        }
-    };
+    guess::compliances(&mut spec, request.payload_kg);
     Ok(UrdfRobot {
         spec,
-        beside,
         base_link: base.to_string(),
         tool_link: tool.to_string(),
         notes,

@@ -1,17 +1,16 @@
-//! A robot as a URDF, and in a file next to it what a URDF has no place for.
+//! A robot as a URDF.
 
 use std::collections::HashSet;
 use std::fmt::Write;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 
-use crate::campaign::robot_text::section_text;
-use crate::data::{BeamSection, JointSpec, RobotSpec};
+use crate::data::{JointSpec, RobotSpec};
 use crate::robot::kinematics::dh::{joint_transform, rpy_of_rotation};
 use crate::robot::{Kinematics, RobotModel};
-use crate::text::{quoted, to_degrees, xml_escaped};
+use crate::text::xml_escaped;
 
-/// The values that go into the files, and where they are from.
+/// The values that go into a URDF and the file next to it, and where they are from.
 #[derive(Debug, Clone)]
 pub struct Sources {
     /// For people: `calibrated on …`, `the robot file, not calibrated`.
@@ -25,24 +24,24 @@ pub struct Sources {
 }
 
 /// The frame of link i of the robot file in that of the URDF, which sits at the joint's axis, as a URDF demands.
-fn behind_axis(joint: &JointSpec) -> Isometry3<f64> {
+pub(crate) fn behind_axis(joint: &JointSpec) -> Isometry3<f64> {
     match joint.placement {
         Some(_) => Isometry3::identity(),
         None => joint_transform(joint, 0.0),
     }
 }
 
-/// What links and joints are called, in both files: each name only once.
-struct Names {
+/// What links and joints are called, in a URDF and the file next to it: each name only once.
+pub(crate) struct Names {
     base: String,
-    links: Vec<String>,
+    pub links: Vec<String>,
     tool: String,
-    joints: Vec<String>,
+    pub joints: Vec<String>,
     tool_joint: String,
 }
 
 impl Names {
-    fn new(spec: &RobotSpec) -> Self {
+    pub fn new(spec: &RobotSpec) -> Self {
         fn new_one(taken: &mut HashSet<String>, wanted: &str) -> String {
             let mut name = wanted.to_string();
             while !taken.insert(name.clone()) {
@@ -151,55 +150,5 @@ pub fn urdf(robot: &RobotModel, sources: &Sources) -> String {
         xml_escaped(&names.tool_joint),
         origin(&(behind * spec.tool.in_flange()))
     );
-    text
-}
-
-/// What a URDF cannot hold, as TOML: compliance of each joint, section of each link, damping ratio, Young's modulus. Links are in the
-/// frames of the URDF.
-pub fn compliances(spec: &RobotSpec, sources: &Sources) -> String {
-    let mut text = format!(
-        "# What the URDF next to this file has no place for. Written by lobestone.\nrobot = {}\nsource = {}\n",
-        quoted(&spec.name),
-        quoted(&sources.source)
-    );
-    for (key, sentences) in [("guesses", &spec.guesses), ("left_out", &sources.left_out)] {
-        if !sentences.is_empty() {
-            let all: Vec<String> = sentences.iter().map(|s| quoted(s)).collect();
-            let _ = writeln!(text, "{key} = [{}]", all.join(", "));
-        }
-    }
-    let _ = writeln!(text, "damping_ratio = {:?}", sources.damping_ratio);
-    if let Some(young_pa) = sources.young_pa {
-        let _ = writeln!(text, "young_pa = {young_pa:?}");
-    }
-    let names = Names::new(spec);
-    for (joint, name) in spec.joints.iter().zip(&names.joints) {
-        let _ = write!(
-            text,
-            "\n[[joint]]\nname = {}\ncompliance_rad_per_nm = {:?}\n",
-            quoted(name),
-            joint.compliance_rad_per_nm
-        );
-        if let Some(limits) = joint.limits_rad {
-            let [low, high] = limits.map(to_degrees);
-            let _ = writeln!(text, "limits_deg = [{low:?}, {high:?}]");
-        }
-    }
-    for ((link, joint), name) in spec.links.iter().zip(&spec.joints).zip(&names.links) {
-        let Some(section) = &link.section else { continue };
-        let axis = section.shape.height_axis().unwrap_or_default();
-        let turned = BeamSection {
-            shape: section
-                .shape
-                .with_height_axis((behind_axis(joint).rotation * Vector3::from(axis)).into()),
-            ..*section
-        };
-        let _ = write!(
-            text,
-            "\n[[link]]\nname = {}\n{}",
-            quoted(name),
-            section_text(&turned)
-        );
-    }
     text
 }

@@ -611,7 +611,7 @@ impl<'a, S: Study> Engine<'a, S> {
         self.minimise(model, View::FULL, &calibration.theta, REFINE)
     }
 
-    /// What explains most and leaves more than noise may be stuck away from its best fit.
+    /// What explains most and leaves more than noise may be stuck away from its best fit, or be another choice of the same effect.
     fn try_harder(&self, best: &mut TriedOf<S>, base_reduced: f64) -> Result<()> {
         let is_noise = |t: &TriedOf<S>| verdict::is_noise(self.reduced_chi2(t));
         if is_noise(best) {
@@ -625,6 +625,36 @@ impl<'a, S: Study> Engine<'a, S> {
             if fit.cost < best.fit.cost {
                 best.fit = fit;
             }
+            if !is_noise(best) {
+                self.try_other_choices(best)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Of the other choices of the effect in `best`, from what that has made of the model: the one that is better by more than what its
+    /// parameters cost.
+    fn try_other_choices(&self, best: &mut TriedOf<S>) -> Result<()> {
+        let label = self.label(&best.instance);
+        let front = [best.fit.theta[..self.base_count].to_vec()];
+        let others: Vec<TriedOf<S>> = self
+            .instances
+            .par_iter()
+            .filter(|other| **other != best.instance && self.label(other) == label)
+            .filter_map(|other| {
+                try_effect(self.study, self.model, other, &front, &self.hints, Effort::Direct)
+            })
+            .map(|other| {
+                let fit = self.minimise(&other.model, View::FULL, &other.fit.theta, REFINE)?;
+                Ok(Tried { fit, ..other })
+            })
+            .collect::<Result<_>>()?;
+        let price = 0.5 * price_of_a_parameter(self.study.real_values(Extent::Full) as f64);
+        let paid = |t: &TriedOf<S>| t.fit.cost + price * t.fit.theta.len() as f64;
+        if let Some(other) = others.into_iter().min_by(|a, b| paid(a).total_cmp(&paid(b)))
+            && paid(&other) < paid(best)
+        {
+            *best = other;
         }
         Ok(())
     }

@@ -107,6 +107,22 @@ fn what_the_data_draw_gets_its_name() {
     assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.2);
 }
 
+/// From where the model stands a soft fixing makes all worse until the joints have made room for it: the verdict was unknown, and `add`
+/// found it.
+#[test]
+fn an_effect_that_a_first_look_passed_over_is_found_from_a_possible_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    let arguments = ["simulate", "--out", path, "--seed", "1960060", "--kind", "direct"];
+    let hidden = ["--effect", "base-mounting", "--lines-hz", "1.0"];
+    document(&[&arguments[..], &hidden].concat());
+    let found = document(&["diagnose", path]);
+    assert_eq!(found["effect"], "base-mounting", "{found:#}");
+    assert!(found["confidence"].as_f64().unwrap() > 0.9);
+    assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.2);
+}
+
 /// The leader is another effect of an impossible size, beside which the right one is found: it alone explains all. The verdict was the
 /// leader.
 #[test]

@@ -72,9 +72,19 @@ pub(crate) const USUAL: [f64; 2] = [100.0, 10_000.0];
 /// 800–1500, aluminium 400–900, titanium 1300–1700, nickel alloys 2400–3500, plastics 50–200) for chips of 0.01 to 0.3 mm.
 /// The bounds are wide: only another unit leaves them.
 const MATERIALS: [(&[&str], [f64; 2]); 7] = [
-    (&["titan", "ti6al4v", "ti-6al", "ti 6al"], [1200.0, 12_000.0]),
+    (
+        &["titan", "ti6al4v", "ti-6al", "ti 6al", "ti64", "ti-64", "3.7"],
+        [1200.0, 12_000.0],
+    ),
     (&["inconel", "nickel", "718", "waspaloy"], [1500.0, 20_000.0]),
-    (&["steel", "stahl", "42crmo4", "aisi", "c45"], [1300.0, 14_000.0]),
+    (
+        &[
+            "steel", "stahl", "acier", "acero", "42crmo", "aisi", "c45", "ck45", "s235", "s275", "s355",
+            "st37", "st 37", "st52", "st 52", "mncr", "crni", "crmo", "4140", "4340", "1.0", "1.1", "1.2",
+            "1.3", "1.4", "1.5", "1.6", "1.7", "1.8",
+        ],
+        [1300.0, 14_000.0],
+    ),
     (
         &["cast iron", "grauguss", "ggg", "en-gjl", "en-gjs"],
         [700.0, 8000.0],
@@ -83,6 +93,20 @@ const MATERIALS: [(&[&str], [f64; 2]); 7] = [
     (&["brass", "copper", "bronze", "messing"], [300.0, 8000.0]),
     (&["acetal", "pom", "delrin", "nylon", "plastic"], [12.0, 1500.0]),
 ];
+
+/// Is a material (in small letters) called so? A word is found anywhere, `1.4` where a European material number (EN 10027-2) begins so:
+/// `1.4301`.
+fn is_called(material: &str, word: &str) -> bool {
+    const DIGITS_OF_A_NUMBER: usize = 5;
+    if !word.starts_with(|c: char| c.is_ascii_digit()) || !word.contains('.') {
+        return material.contains(word);
+    }
+    let mut numbers = material.split(|c: char| !c.is_ascii_digit() && c != '.');
+    let digits = |text: &str| text.bytes().filter(u8::is_ascii_digit).count();
+    numbers
+        .into_iter()
+        .any(|n| n.starts_with(word) && digits(n) == DIGITS_OF_A_NUMBER)
+}
 
 /// Chip thickness for which the lower bounds hold, mm: thinner chips take more.
 const THICK_CHIP_MM: f64 = 0.3;
@@ -150,7 +174,7 @@ pub(super) fn of_scales(trials: &CuttingTrials, cuts: &[&CutAnalysis], process: 
     let material = name.unwrap_or_default().to_lowercase();
     let known = MATERIALS
         .iter()
-        .find(|(words, _)| words.iter().any(|w| material.contains(w)));
+        .find(|(words, _)| words.iter().any(|word| is_called(&material, word)));
     let (bounds, usual, of) = match known {
         Some((_, [low, high])) => {
             let bounds = [(low * thin_chip(chip)).round(), *high];
@@ -255,4 +279,37 @@ fn small_channels(cuts: &[&CutAnalysis]) -> Vec<String> {
             )
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_are_known_by_their_numbers_too() {
+        let known = |name: &str| -> Option<f64> {
+            let of = MATERIALS
+                .iter()
+                .find(|(words, _)| words.iter().any(|w| is_called(name, w)));
+            of.map(|(_, bounds)| bounds[0])
+        };
+        for steel in [
+            "1.4301",
+            "1.0503 normalised",
+            "s235jr",
+            "st 52",
+            "x5crni18-10",
+            "16mncr5",
+            "acier xc48",
+            "ck45",
+        ] {
+            assert_eq!(known(steel), Some(1300.0), "{steel}");
+        }
+        assert_eq!(known("3.7165"), Some(1200.0));
+        assert_eq!(known("en aw-7075"), Some(350.0));
+        // Versions, lengths and plates are no material numbers.
+        for other in ["block 1.4", "plate 11.4301", "v1.0.2", "wood", "3.1355"] {
+            assert_eq!(known(other), None, "{other}");
+        }
+    }
 }

@@ -101,11 +101,9 @@ fn is_called(material: &str, word: &str) -> bool {
     if !word.starts_with(|c: char| c.is_ascii_digit()) || !word.contains('.') {
         return material.contains(word);
     }
-    let mut numbers = material.split(|c: char| !c.is_ascii_digit() && c != '.');
     let digits = |text: &str| text.bytes().filter(u8::is_ascii_digit).count();
-    numbers
-        .into_iter()
-        .any(|n| n.starts_with(word) && digits(n) == DIGITS_OF_A_NUMBER)
+    let mut numbers = material.split(|c: char| !c.is_ascii_digit() && c != '.');
+    numbers.any(|n| n.starts_with(word) && digits(n) == DIGITS_OF_A_NUMBER)
 }
 
 /// Chip thickness for which the lower bounds hold, mm: thinner chips take more.

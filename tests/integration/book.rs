@@ -169,19 +169,17 @@ fn the_readme_shows_what_the_program_prints() {
     let examples = blocks(&readme);
     let mut commands = 0;
     for (_, lines) in examples.iter().filter(|(kind, _)| *kind == "text") {
-        for example in lines.split(|line| line.is_empty()).filter(|e| !e.is_empty()) {
-            let (command, shown) = example.split_first().unwrap();
+        let mut places: Vec<usize> = (0..lines.len()).filter(|i| lines[*i].starts_with('$')).collect();
+        places.push(lines.len());
+        for (command, shown) in places.windows(2).map(|w| (lines[w[0]], &lines[w[0] + 1..w[1]])) {
             let Some(command) = command.strip_prefix("$ lobestone ") else {
                 panic!("README.md: {command}: no command of this program");
             };
             let arguments = words(command.split('#').next().unwrap());
             let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
             let printed = run(arguments[0], &arguments[1..], &folder);
-            let shown: Vec<&str> = shown
-                .iter()
-                .copied()
-                .filter(|l| !l.trim_start().starts_with('#'))
-                .collect();
+            let is_output = |line: &&&str| !line.is_empty() && !line.trim_start().starts_with('#');
+            let shown: Vec<&str> = shown.iter().filter(is_output).copied().collect();
             let missing = missing(&shown, &printed);
             assert!(
                 missing.is_empty(),

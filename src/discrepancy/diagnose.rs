@@ -16,8 +16,8 @@ use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise
 use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_from, from_possible_size, held_out, rescue,
-    try_again, try_effect, try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_from, from_possible_size, held_out,
+    own_starts, rescue, try_again, try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -632,21 +632,43 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(())
     }
 
-    /// Of the other choices of the effect in `best`, from what that has made of the model: the one that is better by more than what its
-    /// parameters cost.
+    /// Of the other choices of the effect in `best`, from what that has made of the model and of the sizes that both have: the one that is
+    /// better by more than what its parameters cost.
     fn try_other_choices(&self, best: &mut TriedOf<S>) -> Result<()> {
         let label = self.label(&best.instance);
-        let front = [best.fit.theta[..self.base_count].to_vec()];
+        let (front, sizes) = best.fit.theta.split_at(self.base_count);
+        let common: Vec<(&str, f64)> = best.model.parameters[self.base_count..]
+            .iter()
+            .map(|p| p.name.as_str())
+            .zip(sizes.iter().copied())
+            .collect();
+        let starts = |model: &ModelOf<S>, other: &InstanceOf<S>| -> Vec<Vec<f64>> {
+            let mut starts = own_starts(self.study, model, self.base_count, other, &self.hints);
+            for start in &mut starts {
+                for (value, parameter) in start.iter_mut().zip(&model.parameters[self.base_count..]) {
+                    let known = common.iter().find(|(name, _)| *name == parameter.name);
+                    *value = known.map_or(*value, |(_, known)| *known);
+                }
+            }
+            starts.dedup();
+            starts
+        };
         let others: Vec<TriedOf<S>> = self
             .instances
             .par_iter()
             .filter(|other| **other != best.instance && self.label(other) == label)
             .filter_map(|other| {
-                try_effect(self.study, self.model, other, &front, &self.hints, Effort::Direct)
+                let model = self.study.extend(self.model, other);
+                let fits = starts(&model, other).into_iter().filter_map(|own| {
+                    let start = [front, &own].concat();
+                    self.minimise(&model, View::COARSE, &start, REFINE).ok()
+                });
+                let lowest = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+                Some((*other, model, lowest))
             })
-            .map(|other| {
-                let fit = self.minimise(&other.model, View::FULL, &other.fit.theta, REFINE)?;
-                Ok(Tried { fit, ..other })
+            .map(|(instance, model, lowest)| {
+                let fit = self.minimise(&model, View::FULL, &lowest.theta, REFINE)?;
+                Ok(Tried { instance, model, fit })
             })
             .collect::<Result<_>>()?;
         let price = 0.5 * price_of_a_parameter(self.study.real_values(Extent::Full) as f64);

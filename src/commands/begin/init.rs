@@ -63,6 +63,9 @@ pub struct InitArgs {
     /// Number of teeth.
     #[arg(long, value_name = "N")]
     teeth: Option<String>,
+    /// What the tool is: endmill, ballend, drill or turning.
+    #[arg(long, value_name = "KIND")]
+    kind: Option<String>,
     /// Helix angle.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     helix_deg: Option<String>,
@@ -141,6 +144,7 @@ impl InitArgs {
             ("frf", "force_level_n", &self.force_level_n),
             ("tool", "diameter_mm", &self.diameter_mm),
             ("tool", "teeth", &self.teeth),
+            ("tool", "kind", &self.kind),
             ("tool", "helix_deg", &self.helix_deg),
             ("tool", "half_point_angle_deg", &self.half_point_angle_deg),
             ("tool", "web_thickness_mm", &self.web_thickness_mm),

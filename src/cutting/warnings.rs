@@ -211,23 +211,29 @@ pub(super) fn of_missed(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option
     })
 }
 
-/// Holes into the full: the chisel edge presses as well.
-pub(super) fn of_full_holes(trials: &CuttingTrials, cuts: &[&CutAnalysis]) -> Option<String> {
+/// Holes into the full: the chisel edge presses as well. Where some have a pilot hole and one set holds for all, it does not press.
+pub(super) fn of_full_holes(
+    trials: &CuttingTrials,
+    cuts: &[&CutAnalysis],
+    all: &ForceGroup,
+) -> Option<String> {
     let is_full = |c: &&&CutAnalysis| {
         let geometry = &trials.cuts[c.cut].geometry;
         matches!(geometry, CutGeometry::Drilling { pilot_diameter_mm, .. } if *pilot_diameter_mm <= 0.0)
     };
     let full = cuts.iter().filter(is_full).count();
-    let holes = match (full, cuts.len()) {
+    let (holes, then) = match (full, cuts.len()) {
         (0, _) => return None,
-        (full, all) if full == all => "all holes are".to_string(),
-        (full, all) => format!("{full} of {all} holes are"),
-    };
-    let then = match full == cuts.len() {
-        true => "for those of the lips drill some holes with a pilot hole as wide as the web",
-        false => {
-            "one set does not hold for these and the holes with a pilot hole; \
-             `lobestone add DIR chisel-edge` tells the two apart"
+        (full, count) if full == count => (
+            "all holes are".to_string(),
+            "for those of the lips drill some holes with a pilot hole as wide as the web",
+        ),
+        (full, count) => {
+            scatters(all, ForceAxis::Z)?;
+            (
+                format!("{full} of {count} holes are"),
+                "one set does not hold for these and the holes with a pilot hole; `lobestone add DIR chisel-edge` tells the two apart",
+            )
         }
     };
     Some(format!(
@@ -280,22 +286,29 @@ pub(super) fn of_fits(all: &ForceGroup, groups: &[&ForceGroup]) -> Vec<String> {
         ));
     }
     for &axis in ForceAxis::of(all.process) {
-        let a = axis.index();
-        let on_axis = || all.points.iter().filter(|p| p.axis == axis);
-        let square_sum: f64 = on_axis().map(|p| p.measured.powi(2)).sum();
-        let size = (square_sum / on_axis().count().max(1) as f64).sqrt();
-        let extra = all.extra_scatter[a];
-        if all.chi2_per_dof[a].is_some_and(|c| c > 4.0) && extra > 0.02 * size {
+        if let Some(share) = scatters(all, axis) {
             warnings.push(format!(
-                "{}: the averages of all cuts scatter by {extra:.2} {} ({:.0} %) more than their errors: one set of \
+                "{}: the averages of all cuts scatter by {:.2} {} ({:.0} %) more than their errors: one set of \
                  coefficients does not hold for all of them; compare the speeds, and look at wear and drift",
                 axis.label(),
+                all.extra_scatter[axis.index()],
                 axis.unit(),
-                100.0 * extra / size
+                100.0 * share
             ));
         }
     }
     warnings
+}
+
+/// By what part of their size the averages on an axis scatter beyond their errors, where that is plain: one set of coefficients does not
+/// hold for all of them.
+fn scatters(all: &ForceGroup, axis: ForceAxis) -> Option<f64> {
+    let on_axis = || all.points.iter().filter(|p| p.axis == axis);
+    let square_sum: f64 = on_axis().map(|p| p.measured.powi(2)).sum();
+    let size = (square_sum / on_axis().count().max(1) as f64).sqrt();
+    let extra = all.extra_scatter[axis.index()];
+    let is_plain = all.chi2_per_dof[axis.index()].is_some_and(|c| c > 4.0) && extra > 0.02 * size;
+    is_plain.then(|| extra / size)
 }
 
 /// Bootstrap and regression errors further apart than this factor contradict each other.

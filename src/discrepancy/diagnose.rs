@@ -702,7 +702,11 @@ impl<'a, S: Study> Engine<'a, S> {
             impossible || own.clone().any(|i| t.fit.at_bound.contains(&i))
         };
         // Every choice of it: they differ in what they do, and the one that led need not be the one that explains.
-        let passed_over = self.instances.iter().filter(|i| i.effect.on_promise());
+        let everywhere = |i: &InstanceOf<S>| i.site == Site::Everywhere;
+        let passed_over = self
+            .instances
+            .iter()
+            .filter(|i| everywhere(i) && i.effect.on_promise());
         let passed_over = passed_over.filter_map(|instance| {
             let model = self.study.extend(self.model, instance);
             let fit = vanished(&model, coarse_base)?;
@@ -711,13 +715,13 @@ impl<'a, S: Study> Engine<'a, S> {
         });
         let stuck: Vec<TriedOf<S>> = tried
             .iter()
+            .filter(|t| everywhere(&t.instance) && !t.instance.effect.on_promise())
             .filter(cannot_be)
             .cloned()
             .chain(passed_over)
             .collect();
         let found: Vec<Option<TriedOf<S>>> = stuck
             .par_iter()
-            .filter(|t| t.instance.site == Site::Everywhere)
             .map(|t| from_possible_size(self.study, t, &bases, REFINE))
             .collect::<Result<_>>()?;
         put_among(refined, found.into_iter().flatten());

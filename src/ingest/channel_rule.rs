@@ -427,9 +427,9 @@ fn with_rate(path: &Path, rules: &[ChannelRule]) -> Result<Option<(Format, Plain
 /// What a force is (`fx`), and how its channel is called.
 pub type NamedForce = (&'static str, String);
 
-/// Forces of one cut in a file of several, or in one that says no times: what its channels have in common in their names (`R_1`; empty in a file of one
-/// cut), and the channels.
-pub type TimelessCut = (String, Vec<NamedForce>);
+/// Forces of one cut, told by their names: what the channels have in common in them (`R_1`; empty in a file of one cut), and the
+/// channels.
+pub type NamedCut = (String, Vec<NamedForce>);
 
 /// What is in a file that says neither times nor a sampling rate; nothing where it holds no forces, or says its times.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -437,7 +437,7 @@ pub struct Timeless {
     /// The forces, as those of one cut.
     pub forces: Vec<NamedForce>,
     /// The cuts, told apart by what stands beside Fx, Fy, Fz, Mz in the names of the channels (`Fx_R_1`, `Fy_R_1`: `R_1`).
-    pub cuts: Vec<TimelessCut>,
+    pub cuts: Vec<NamedCut>,
 }
 
 /// Looks for forces in a file that says neither times nor a sampling rate.
@@ -469,7 +469,7 @@ pub fn forces_of(records: &[TimeRecord]) -> Vec<NamedForce> {
 }
 
 /// The cuts in a file whose channels are called by the cut as well (`Fx_R_1`, `Fx_R_2`); one where each force stands there once.
-pub fn cuts_of(records: &[TimeRecord]) -> Vec<TimelessCut> {
+pub fn cuts_of(records: &[TimeRecord]) -> Vec<NamedCut> {
     let named = |channel: &Channel| -> Option<(&'static str, String, String)> {
         let name = channel.name.as_str();
         let lower = name.to_ascii_lowercase();
@@ -493,7 +493,7 @@ pub fn cuts_of(records: &[TimeRecord]) -> Vec<TimelessCut> {
         let some = (!own.is_empty()).then(|| (String::new(), own));
         return some.into_iter().collect();
     }
-    let mut cuts: Vec<TimelessCut> = Vec::new();
+    let mut cuts: Vec<NamedCut> = Vec::new();
     for (what, name, id) in found {
         let place = cuts
             .iter()

@@ -23,7 +23,7 @@ pub mod units;
 
 pub use crate::data::{Axis, Channel, ChannelRole, Dof, FrfRecord, Quantity, TimeRecord};
 pub use channel_rule::{
-    ChannelRule, Gain, Measures, NamedForce, Source, Timeless, TimelessCut, cuts_of, forces_of, read_file_at,
+    ChannelRule, Gain, Measures, NamedCut, NamedForce, Source, Timeless, cuts_of, forces_of, read_file_at,
     read_forces_with, read_time_with, timeless,
 };
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord, TimeFile};

@@ -99,13 +99,8 @@ pub(super) fn air_in<S: Sample>(
         return None;
     }
     let turn = spindle.samples_per_revolution;
-    let most = (MOST_TURNS as f64 * turn) as usize;
     let is_before = candidate.end <= cutting.start;
-    let near = match is_before {
-        true => candidate.end - candidate.len().min(most)..candidate.end,
-        false => candidate.start..candidate.start + candidate.len().min(most),
-    };
-    let cut = core(cutting, most);
+    let (near, cut) = (nearest(candidate, is_before, turn), core(cutting, turn));
     air_as_it_is(channels, candidate, cutting, turn)
         .or_else(|| {
             let found = air_without_hum(channels, [&near, &cut], spindle)?;
@@ -164,9 +159,23 @@ fn is_next_to_none<S: Sample>(channels: &[&[S]], air: &Range<usize>, cut: &Range
         && stands_off(channels, air, cut, turn)
 }
 
-/// The middle of a cut, of so many samples at most.
-fn core(cutting: &Range<usize>, most: usize) -> Range<usize> {
-    let spare = cutting.len().saturating_sub(most) / 2;
+/// Samples that are looked at, at most. `turn`: samples a revolution.
+fn most_samples(turn: f64) -> usize {
+    (MOST_TURNS as f64 * turn) as usize
+}
+
+/// What of `air` lies nearest to the cut.
+fn nearest(air: &Range<usize>, is_before: bool, turn: f64) -> Range<usize> {
+    let length = air.len().min(most_samples(turn));
+    match is_before {
+        true => air.end - length..air.end,
+        false => air.start..air.start + length,
+    }
+}
+
+/// The middle of a cut.
+fn core(cutting: &Range<usize>, turn: f64) -> Range<usize> {
+    let spare = cutting.len().saturating_sub(most_samples(turn)) / 2;
     cutting.start + spare..cutting.end - spare
 }
 
@@ -177,16 +186,12 @@ fn air_as_it_is<S: Sample>(
     cutting: &Range<usize>,
     turn: f64,
 ) -> Option<Range<usize>> {
-    let most = (MOST_TURNS as f64 * turn) as usize;
     let is_before = candidate.end <= cutting.start;
-    let core = core(cutting, most);
+    let core = core(cutting, turn);
     let (cut, cut_all) = content(channels, &core, turn)?;
     let mut air = candidate.clone();
     loop {
-        let nearest = match is_before {
-            true => air.end - air.len().min(most)..air.end,
-            false => air.start..air.start + air.len().min(most),
-        };
+        let nearest = nearest(&air, is_before, turn);
         let (own, own_all) = content(channels, &nearest, turn)?;
         if cut <= REPEATS * cut_all {
             let scatter_tells = own_all < SCATTER_OF_AIR * cut_all;

@@ -1,5 +1,7 @@
 //! Drive, gear loss, bearing, base, contact, warming: hidden in a campaign each, named, added, measured.
 
+use serde_json::Value;
+
 use crate::support::document;
 
 /// What is hidden, with its parameters as asked for, and the key of the choice.
@@ -62,16 +64,21 @@ fn each_is_named_and_added_with_its_parameters() {
     }
 }
 
+/// The verdict on a campaign that `simulate` makes with these options.
+fn diagnosed(options: &str) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    let options: Vec<&str> = options.split(' ').collect();
+    document(&[&["simulate", "--out", path], &options[..]].concat());
+    document(&["diagnose", path])
+}
+
 /// A campaign on which the fit with flexible links ran away to 1180 GPa, beyond the other candidates: `add` found the optimum that
 /// `diagnose` had called unknown.
 #[test]
 fn what_add_finds_diagnose_finds() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("cell");
-    let path = dir.to_str().unwrap();
-    let arguments = ["simulate", "--out", path, "--seed", "970131", "--random", "trial"];
-    document(&[&arguments[..], &["--lines-hz", "0.5"]].concat());
-    let found = document(&["diagnose", path]);
+    let found = diagnosed("--seed 970131 --random trial --lines-hz 0.5");
     assert_eq!(found["effect"], "link-flexibility", "{}", found["best_guess"]);
     assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.05);
 }
@@ -80,11 +87,7 @@ fn what_add_finds_diagnose_finds() {
 /// prior pulls harder than the data. All data show it by ΔBIC −60; the verdict was `unknown`.
 #[test]
 fn what_only_all_data_show_is_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("cell");
-    let path = dir.to_str().unwrap();
-    document(&["simulate", "--out", path, "--seed", "970155", "--random", "trial"]);
-    let found = document(&["diagnose", path]);
+    let found = diagnosed("--seed 970155 --random trial");
     assert_eq!(found["effect"], "base-compliance", "{}", found["best_guess"]);
     let leader = &found["candidates"][0];
     assert!(leader["delta_bic"].as_f64().unwrap() < -50.0, "{leader}");
@@ -94,13 +97,7 @@ fn what_only_all_data_show_is_found() {
 /// bearing. The verdict was `unknown`, with the bearing as what the data draw.
 #[test]
 fn what_the_data_draw_gets_its_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("cell");
-    let path = dir.to_str().unwrap();
-    let arguments = ["simulate", "--out", path, "--seed", "1900028", "--kind", "direct"];
-    let hidden = ["--effect", "bearing-compliance", "--lines-hz", "2.0"];
-    document(&[&arguments[..], &hidden].concat());
-    let found = document(&["diagnose", path]);
+    let found = diagnosed("--seed 1900028 --kind direct --effect bearing-compliance --lines-hz 2.0");
     assert_eq!(found["effect"], "bearing-compliance", "{}", found["lead"]);
     assert_eq!(found["site"], "joint-4");
     assert!(found["lead"].is_null());
@@ -111,13 +108,7 @@ fn what_the_data_draw_gets_its_name() {
 /// found it.
 #[test]
 fn an_effect_that_a_first_look_passed_over_is_found_from_a_possible_size() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("cell");
-    let path = dir.to_str().unwrap();
-    let arguments = ["simulate", "--out", path, "--seed", "1960060", "--kind", "direct"];
-    let hidden = ["--effect", "base-mounting", "--lines-hz", "1.0"];
-    document(&[&arguments[..], &hidden].concat());
-    let found = document(&["diagnose", path]);
+    let found = diagnosed("--seed 1960060 --kind direct --effect base-mounting --lines-hz 1.0");
     assert_eq!(found["effect"], "base-mounting", "{found:#}");
     assert!(found["confidence"].as_f64().unwrap() > 0.9);
     assert!(found["candidates"][0]["reduced_chi2"].as_f64().unwrap() < 1.2);
@@ -127,13 +118,7 @@ fn an_effect_that_a_first_look_passed_over_is_found_from_a_possible_size() {
 /// leader.
 #[test]
 fn an_effect_that_only_led_to_the_right_one_is_dropped() {
-    let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("cell");
-    let path = dir.to_str().unwrap();
-    let arguments = ["simulate", "--out", path, "--seed", "1960026", "--kind", "direct"];
-    let hidden = ["--effect", "bearing-compliance", "--lines-hz", "1.0"];
-    document(&[&arguments[..], &hidden].concat());
-    let found = document(&["diagnose", path]);
+    let found = diagnosed("--seed 1960026 --kind direct --effect bearing-compliance --lines-hz 1.0");
     assert_eq!(found["effect"], "bearing-compliance", "{found:#}");
     assert_eq!(found["site"], "joint-5");
     assert!(found["companion"].is_null());

@@ -97,7 +97,12 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
             (Cow::Owned(f), Cow::Owned(h))
         })
         .collect();
-    let single = modal::analyse_frfs(&clean, settings)?;
+    // What all FRFs have together does not depend on whether those of each are asked for.
+    let starts = Settings {
+        each: false,
+        ..*settings
+    };
+    let mut single = modal::analyse_frfs(&clean, &starts)?;
     let mut dofs: Vec<String> = inputs
         .iter()
         .filter_map(|i| i.dofs.as_ref())
@@ -122,6 +127,9 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         })
         .collect();
     let mut global = modal::global(&members, settings)?;
+    if settings.each && single.iter().any(|frf| frf.brief) {
+        single = modal::analyse_frfs(&clean, settings)?;
+    }
     global.warnings.extend(shorter_bands(&inputs, settings.band_hz));
     if let Some(highest) = sound_hz.iter().flatten().copied().reduce(f64::max) {
         global.warnings.push(format!(

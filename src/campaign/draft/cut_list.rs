@@ -155,7 +155,7 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             // An empty row, or one of units.
             continue;
         }
-        let found = cut_in_file(&rows, row, naming, &ids, scan);
+        let found = cut_in_file(&name, &rows, row, naming, &ids, scan);
         let Some(at) = found.or_else(|| record_named(&name, scan)) else {
             return Err(wrong(
                 format!(
@@ -284,25 +284,29 @@ fn of_thousands(value: &str) -> Option<String> {
     (is_slow && all_digits(front) && back.len() == 3 && all_digits(back)).then(|| format!("{front}{back}"))
 }
 
+/// Is this the path's own name, with or without folders and ending?
+fn is_named(path: &str, name: &str) -> bool {
+    path == name || path.rsplit('/').next() == Some(name) || stem(path) == name
+}
+
 /// Index of the record that a row means where its file holds several cuts: the one whose id a cell of the row says; where none does and
 /// the list has a row for each of them, in their order.
 fn cut_in_file(
+    name: &str,
     rows: &[csv::StringRecord],
     row: &csv::StringRecord,
     naming: usize,
     ids: &[String],
     scan: &Scan,
 ) -> Option<usize> {
-    let name = &row[naming];
-    let is_its = |path: &str| path == name || path.rsplit('/').next() == Some(name) || stem(path) == name;
     let forces = scan.forces.iter().enumerate();
     let cuts: Vec<usize> = forces
-        .filter(|(_, f)| f.part.is_some() && is_its(&f.path))
+        .filter(|(_, f)| f.part.is_some() && is_named(&f.path, name))
         .map(|(at, _)| at)
         .collect();
     let mut cells = row.iter().enumerate().filter(|(i, _)| *i != naming);
     let said = cells.find_map(|(_, cell)| cuts.iter().copied().find(|at| ids[*at] == cell));
-    let alike: Vec<&csv::StringRecord> = rows.iter().filter(|other| &other[naming] == name).collect();
+    let alike: Vec<&csv::StringRecord> = rows.iter().filter(|r| r[naming] == row[naming]).collect();
     let place = alike.iter().position(|other| other.position() == row.position());
     let in_order = place
         .filter(|_| alike.len() == cuts.len())
@@ -318,7 +322,7 @@ fn record_named(name: &str, scan: &Scan) -> Option<usize> {
         digits.split(|c: char| !c.is_ascii_digit()).next()?.parse().ok()
     };
     let is_number = name.bytes().all(|b| b.is_ascii_digit());
-    let exact = |path: &str| path == name || path.rsplit('/').next() == Some(name) || stem(path) == name;
+    let exact = |path: &str| is_named(path, name);
     let nearly =
         |path: &str| letters(stem(path)) == letters(name) || letters(stem(path)) == letters(stem(name));
     let by_number = |path: &str| is_number && number(stem(path)) == name.parse().ok();

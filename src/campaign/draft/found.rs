@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::names::Facts;
 use crate::data::Quantity;
-use crate::ingest::{NamedForce, PlainColumn, TimelessCut};
+use crate::ingest::{NamedCut, NamedForce, PlainColumn};
 
 /// A folder's measurement files, in the order of their paths (from the folder, with forward slashes).
 #[derive(Debug, Default, Clone)]
@@ -53,7 +53,7 @@ pub struct FoundForce {
     pub(crate) from_name: Facts,
     pub(crate) from_header: Facts,
     /// Id and channels, where the file holds several cuts and this is one of them.
-    pub part: Option<TimelessCut>,
+    pub part: Option<NamedCut>,
     /// The file says its times, or how fast it was sampled.
     pub says_times: bool,
 }

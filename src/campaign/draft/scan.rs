@@ -12,7 +12,7 @@ use super::names::{Facts, facts_of, facts_of_header, posture_of};
 use crate::campaign::campaign_file;
 use crate::data::{Channel, ChannelRole, Quantity, RobotSpec, TimeRecord};
 use crate::ingest::{
-    NamedForce, PlainColumn, SIGNALS, Timeless, TimelessCut, cuts_of, forces_of, is_called_acceleration,
+    NamedCut, NamedForce, PlainColumn, SIGNALS, Timeless, cuts_of, forces_of, is_called_acceleration,
     is_called_marker, plain_columns, sheet_text, survey, timeless, unit_of_charge_or_other,
     units::{self, Dimension},
 };
@@ -115,8 +115,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
     if !scan.cut_lists.is_empty() && nameless.is_empty() {
         nameless = signals;
     } else {
-        let not_used = signals.into_iter().map(|(force, _, why)| (force.path, why));
-        scan.not_used.extend(not_used);
+        scan.not_used.extend(signals.into_iter().map(left_out));
     }
     take_nameless(&mut scan, nameless);
     // Several FRF files in each of several folders: a folder is a posture.
@@ -370,7 +369,7 @@ fn without_forces(times: &[TimeRecord]) -> String {
 }
 
 /// The cuts of a file that holds more than one.
-fn several(of_file: &FoundForce, cuts: Vec<TimelessCut>) -> Seen {
+fn several(of_file: &FoundForce, cuts: Vec<NamedCut>) -> Seen {
     let each = cuts.into_iter().map(|cut| FoundForce {
         part: Some(cut),
         ..of_file.clone()
@@ -436,9 +435,16 @@ fn take_timeless(scan: &mut Scan, timeless: Vec<TimelessForce>) {
     }
 }
 
+/// A file, its columns, and why it was not understood.
+type NamelessForce = (FoundForce, Vec<PlainColumn>, String);
+
+fn left_out((force, _, why): NamelessForce) -> (String, String) {
+    (force.path, why)
+}
+
 /// Tables without names are the folder's force records where no file has names and all have the same columns: what these are
 /// is asked once.
-fn take_nameless(scan: &mut Scan, nameless: Vec<(FoundForce, Vec<PlainColumn>, String)>) {
+fn take_nameless(scan: &mut Scan, nameless: Vec<NamelessForce>) {
     let layout = |columns: &[PlainColumn]| {
         let names: Vec<Option<String>> = columns.iter().map(|c| c.name.clone()).collect();
         (names, columns.first().is_some_and(|c| c.step.is_some()))
@@ -447,8 +453,7 @@ fn take_nameless(scan: &mut Scan, nameless: Vec<(FoundForce, Vec<PlainColumn>, S
         .iter()
         .all(|(_, columns, _)| layout(columns) == layout(&nameless[0].1));
     if !scan.forces.is_empty() || !alike {
-        let not_used = nameless.into_iter().map(|(force, _, why)| (force.path, why));
-        scan.not_used.extend(not_used);
+        scan.not_used.extend(nameless.into_iter().map(left_out));
         return;
     }
     for (force, columns, _) in nameless {

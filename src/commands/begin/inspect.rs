@@ -205,7 +205,7 @@ const SHOWN_CUTS: usize = 2;
 /// that say the rest; else `error`, as it is.
 fn without_times(path: &Path, error: InputError) -> InputError {
     let cuts = ingest::timeless(path).unwrap_or_default().cuts;
-    let names = |cuts: &[ingest::TimelessCut]| {
+    let names = |cuts: &[ingest::NamedCut]| {
         let all: Vec<&str> = cuts
             .iter()
             .flat_map(|(_, c)| c.iter().map(|(_, name)| name.as_str()))

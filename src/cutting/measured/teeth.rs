@@ -36,11 +36,8 @@ pub(crate) fn idle_tooth(
     let unit = single_tooth(cut).closed_form(teeth);
     // The edge is left out: its waveform differs little, and the scale comes from the mean.
     let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
-    let of_tooth = |k: usize| -> f64 {
-        let axis = |axis: usize| (unit[0][axis][k] * k_t + unit[1][axis][k] * k_r).norm_sqr();
-        axis(0) + axis(1)
-    };
-    let measured = |k: usize| orders[0][k - 1].norm_sqr() + orders[1][k - 1].norm_sqr();
+    let of_tooth = |k: usize| power_of_chip(&unit, k, (k_t, k_r));
+    let measured = |k: usize| power_of(orders, k);
     let strongest = (1..=teeth).map(of_tooth).fold(0.0, f64::max);
     // |A_k| = |A_{N−k}|: both orders together.
     let share = |k: usize| -> f64 {
@@ -123,7 +120,7 @@ pub(crate) fn tooth_passing_too_weak(
             at_most = at_most.max((twice / once).sqrt());
         }
     }
-    let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
+    let power = |k: usize| power_of(orders, k);
     let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
     let (once, twice) = (power(teeth), power(2 * teeth));
     // What noise hides of the tooth passing is granted it.
@@ -132,10 +129,8 @@ pub(crate) fn tooth_passing_too_weak(
     let lacks = mean.is_some_and(|mean| {
         let n = teeth as f64;
         let single = single_tooth(cut).closed_form(teeth);
-        let promised = direction(&single, n, orders, mean, true).map(|(k_t, k_r)| {
-            let axis = |a: usize| (single[0][a][teeth] * k_t + single[1][a][teeth] * k_r).norm_sqr();
-            n * n * (axis(0) + axis(1))
-        });
+        let promised = direction(&single, n, orders, mean, true);
+        let promised = promised.map(|direction| n * n * power_of_chip(&single, teeth, direction));
         promised.is_some_and(|promised| once < LACKING * LACKING * promised)
     });
     let told = (is_strongest || lacks)
@@ -162,7 +157,7 @@ pub(crate) fn parts_of_turn(
     std: [&[f64]; 2],
     zero_is_known: bool,
 ) -> Option<usize> {
-    let power = |k: usize| orders.iter().map(|o| o[k - 1].norm_sqr()).sum::<f64>();
+    let power = |k: usize| power_of(orders, k);
     let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
     let count = orders.iter().map(|o| o.len()).min()?;
     let strongest_of_all = (1..=count).map(power).fold(0.0, f64::max);
@@ -221,7 +216,7 @@ pub(crate) fn tooth_back_mm(
             continue;
         }
         let square = |values: [f64; 2]| values.iter().map(|v| v * v).sum::<f64>();
-        power += (orders[0][k - 1].norm_sqr() + orders[1][k - 1].norm_sqr()) / gain;
+        power += power_of(orders, k) / gain;
         noise += square([std[0][k - 1], std[1][k - 1]]) / gain;
         of_tooth += 2.0 - 2.0 * (TAU * k as f64 / n).cos();
     }
@@ -233,6 +228,17 @@ pub(crate) fn tooth_back_mm(
     };
     let told = back > part * cut.feed_per_tooth_mm && power > CERTAIN * CERTAIN * noise;
     (told && back.is_finite()).then_some(back)
+}
+
+/// Of order `k` of the forces in tool axes x and y, N².
+fn power_of(orders: [&[Complex64]; 2], k: usize) -> f64 {
+    orders.iter().map(|o| o[k - 1].norm_sqr()).sum()
+}
+
+/// The same of a chip that is cut with so much tangential and radial force.
+fn power_of_chip(unit: &UnitForces, k: usize, (k_t, k_r): (f64, f64)) -> f64 {
+    let axis = |axis: usize| (unit[0][axis][k] * k_t + unit[1][axis][k] * k_r).norm_sqr();
+    axis(0) + axis(1)
 }
 
 fn single_tooth(cut: &MillingCut) -> MillingCut {
@@ -253,12 +259,8 @@ fn direction(
     mean: [f64; 2],
     zero_is_known: bool,
 ) -> Option<(f64, f64)> {
-    let (k_t, k_r) = USUAL_DIRECTION;
-    let of_tooth = |k: usize| {
-        let axis = |axis: usize| (unit[0][axis][k] * k_t + unit[1][axis][k] * k_r).norm_sqr();
-        axis(0) + axis(1)
-    };
-    let measured = |k: usize| orders[0][k - 1].norm_sqr() + orders[1][k - 1].norm_sqr();
+    let of_tooth = |k: usize| power_of_chip(unit, k, USUAL_DIRECTION);
+    let measured = |k: usize| power_of(orders, k);
     let at = teeth as usize;
     let strongest = (1..=at).map(of_tooth).fold(0.0, f64::max);
     let is_weak = of_tooth(at) <= WEAK * strongest;
@@ -277,6 +279,7 @@ fn direction(
         return (k_t.is_finite() && k_r.is_finite()).then_some((k_t, k_r));
     }
     let scale = (measured(at) / (of_tooth(at) * teeth * teeth)).sqrt();
+    let (k_t, k_r) = USUAL_DIRECTION;
     scale.is_finite().then_some((scale * k_t, scale * k_r))
 }
 

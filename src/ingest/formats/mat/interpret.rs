@@ -623,11 +623,10 @@ fn time_signals(
         }
         axes.sort_by_key(|a| std::cmp::Reverse(a.0));
     }
-    if !axes.is_empty() {
-        rates
-            .iter()
-            .take(if only_rates { usize::MAX } else { 1 })
-            .for_each(|(k, _)| used[*k] = true);
+    // Beside times the first rate says them more exactly; without, each says its struct's.
+    let asked = if only_rates { rates.len() } else { 1 };
+    for (k, _) in rates.iter().take(asked).filter(|_| !axes.is_empty()) {
+        used[*k] = true;
     }
     for (length, rate, start_s, uneven) in axes {
         for (k, variable) in variables.iter().enumerate() {

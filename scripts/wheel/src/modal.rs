@@ -2,7 +2,7 @@
 
 use lobestone::analysis::modes::modal::{FrfInput, TOGETHER};
 use lobestone::analysis::{ModalAnalysis, SetModes};
-use lobestone::modal::{Settings, Tolerances};
+use lobestone::modal::Settings;
 use num_complex::Complex64;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
@@ -29,7 +29,7 @@ pub fn fit<'py>(
     let settings = Settings {
         band_hz,
         max_order,
-        tolerances: Tolerances::default(),
+        ..Settings::default()
     };
     let analysis = done(py, progress, || ModalAnalysis::of(inputs, Vec::new(), &settings))?;
     let answer = PyDict::new(py);

@@ -232,7 +232,10 @@ impl Lab {
         turn: f64,
     ) -> [f64; 3] {
         let k: Vec<f64> = physics.coefficient.iter().map(|k| k.value).collect();
-        let exponent = physics.size_exponent.as_ref().map_or(0.0, |p| p.value);
+        let exponents = physics
+            .size_exponent
+            .as_ref()
+            .map(|p| [0, 1, 2].map(|d| p[d].value));
         let runout = physics
             .runout
             .as_ref()
@@ -263,11 +266,11 @@ impl Lab {
                 if h <= 0.0 {
                     continue;
                 }
-                let chip = match exponent == 0.0 {
-                    true => h,
-                    false => h * (h / crate::cutting::waveform::ChipLaw::REFERENCE_MM).powf(-exponent),
+                let chip = match exponents {
+                    None => [h; 3],
+                    Some(p) => p.map(|p| h * (h / crate::cutting::waveform::ChipLaw::REFERENCE_MM).powf(-p)),
                 };
-                let [tangential, radial, axial] = [0, 1, 2].map(|d| (k[d] * chip + k[d + 3]) * slice_mm);
+                let [tangential, radial, axial] = [0, 1, 2].map(|d| (k[d] * chip[d] + k[d + 3]) * slice_mm);
                 sum[0] += -tangential * cos - radial * sin;
                 sum[1] += tangential * sin - radial * cos;
                 sum[2] += axial;

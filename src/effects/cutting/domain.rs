@@ -76,8 +76,8 @@ pub struct CuttingSummary {
 pub struct CutPhysics {
     /// Of this cut: milling and turning Ktc Krc Kac Kte Kre Kae; drilling Ktc Kte Kfc Kfe.
     pub coefficient: Vec<Dual>,
-    /// p in K ∝ (h / 0.1 mm)^−p.
-    pub size_exponent: Option<Dual>,
+    /// p in K ∝ (h / 0.1 mm)^−p, of the tangential, radial and axial coefficient (drilling: of torque and twice of thrust).
+    pub size_exponent: Option<[Dual; 3]>,
     /// Eccentric tool; `None` where it runs true.
     pub runout: Option<Runout>,
     /// Teeth that differ beyond what the tool's description says; `None` where they do not.

@@ -139,18 +139,19 @@ fn add_units(forces: &mut Forces, unit: &UnitForces, physics: &CutPhysics, dyno_
     }
 }
 
-/// Adds the derivative by something that the unit forces depend on: only a slope, the value does not change with it.
+/// Adds the derivative by something that the unit forces depend on, in each direction of the force by its own: only a slope, the
+/// value does not change with it.
 fn add_slopes(
     forces: &mut Forces,
     slope: &UnitForces,
-    by: &Dual,
+    by: [&Dual; 3],
     physics: &CutPhysics,
     dyno_from_tool: &[[f64; 3]; 3],
 ) {
     for (k, unit) in slope.iter().enumerate() {
         let weight = Dual {
             value: 0.0,
-            gradient: by
+            gradient: by[k % 3]
                 .gradient
                 .iter()
                 .map(|g| g * physics.coefficient[k].value)
@@ -172,16 +173,26 @@ fn vibrating_forces(
     parameters: usize,
 ) -> (Forces, LineAmplitudes) {
     let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
-    let exponent = physics.size_exponent.as_ref().map(|p| p.value);
-    let vibrating = milling.vibrating(
-        cut.orders,
-        exponent,
-        [change[0].value, change[1].value],
-        MOST_SHIFT as usize,
+    let vibrating = by_direction(
+        physics,
+        |exponent| {
+            let change_mm = [change[0].value, change[1].value];
+            milling.vibrating(cut.orders, exponent, change_mm, MOST_SHIFT as usize)
+        },
+        |all, own, k| {
+            all.unit[k] = own.unit[k].clone();
+            for (all, own) in all.slopes.iter_mut().zip(&*own.slopes) {
+                all[k] = own[k].clone();
+            }
+            let lines = all.lines.iter_mut().chain(all.line_slopes.iter_mut().flatten());
+            for (all, own) in lines.zip(own.lines.iter().chain(own.line_slopes.iter().flatten())) {
+                all[k] = own[k];
+            }
+        },
     );
     add_units(&mut forces, &vibrating.unit, physics, dyno_from_tool);
     if parameters > 0 {
-        let own = [physics.size_exponent.as_ref(), Some(&change[0]), Some(&change[1])];
+        let own = [exponents(physics), Some([&change[0]; 3]), Some([&change[1]; 3])];
         for (slope, by) in vibrating.slopes.iter().zip(own) {
             if let Some(by) = by {
                 add_slopes(&mut forces, slope, by, physics, dyno_from_tool);
@@ -213,15 +224,40 @@ fn chip_forces(
         let teeth = milling.own_teeth(cut.orders, parameters > 0);
         add_units(&mut forces, &teeth.unit, physics, dyno_from_tool);
         for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
-            add_slopes(&mut forces, &teeth.by_radius[index], by, physics, dyno_from_tool);
+            add_slopes(
+                &mut forces,
+                &teeth.by_radius[index],
+                [by; 3],
+                physics,
+                dyno_from_tool,
+            );
         }
         for (index, by) in own.into_iter().flat_map(OwnTeeth::angles) {
-            add_slopes(&mut forces, &teeth.by_angle[index], by, physics, dyno_from_tool);
+            add_slopes(
+                &mut forces,
+                &teeth.by_angle[index],
+                [by; 3],
+                physics,
+                dyno_from_tool,
+            );
         }
         return forces;
     }
-    let law = chip_law(physics);
-    let sampled = (!is_linear).then(|| milling.sampled(cut.orders, law, parameters > 0));
+    let sampled_of = |milling: &MillingCut, derivatives: bool| {
+        by_direction(
+            physics,
+            |exponent| milling.sampled(cut.orders, chip_law(physics, exponent), derivatives),
+            |all, own, k| {
+                all.unit[k] = own.unit[k].clone();
+                for (all, own) in all.slopes.iter_mut().zip(&own.slopes) {
+                    if let (Some(all), Some(own)) = (all, own) {
+                        all[k] = own[k].clone();
+                    }
+                }
+            },
+        )
+    };
+    let sampled = (!is_linear).then(|| sampled_of(milling, parameters > 0));
     let unmoved = match (&sampled, unit) {
         (Some(sampled), _) => Cow::Borrowed(&sampled.unit),
         (None, Some(unit)) => Cow::Borrowed(unit),
@@ -229,9 +265,9 @@ fn chip_forces(
     };
     add_units(&mut forces, &unmoved, physics, dyno_from_tool);
     let of_the_law = [
-        physics.size_exponent.as_ref(),
-        physics.runout.as_ref().map(|r| &r.offset_mm),
-        physics.runout.as_ref().map(|r| &r.angle_rad),
+        exponents(physics),
+        physics.runout.as_ref().map(|r| [&r.offset_mm; 3]),
+        physics.runout.as_ref().map(|r| [&r.angle_rad; 3]),
     ];
     let slopes = sampled.iter().flat_map(|s| &s.slopes);
     for (slope, by) in slopes.zip(of_the_law) {
@@ -244,7 +280,7 @@ fn chip_forces(
     let tooth_slope = |change: &dyn Fn(&mut ToothPlace), index: usize| {
         let mut moved = milling.clone();
         change(&mut moved.places[index]);
-        let mut slope = moved.sampled(cut.orders, law, false).unit;
+        let mut slope = sampled_of(&moved, false).unit;
         let values = slope.iter_mut().flatten().flatten();
         let from = unmoved.iter().flatten().flatten();
         values
@@ -254,18 +290,43 @@ fn chip_forces(
     };
     for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
         let slope = tooth_slope(&|place| place.radius_mm += STEP, index);
-        add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
+        add_slopes(&mut forces, &slope, [by; 3], physics, dyno_from_tool);
     }
     for (index, by) in own.into_iter().flat_map(OwnTeeth::angles) {
         let slope = tooth_slope(&|place| place.ahead_rad += STEP, index);
-        add_slopes(&mut forces, &slope, by, physics, dyno_from_tool);
+        add_slopes(&mut forces, &slope, [by; 3], physics, dyno_from_tool);
     }
     forces
 }
 
-fn chip_law(physics: &CutPhysics) -> ChipLaw {
+/// Those of the size effect in the three directions of the force.
+fn exponents(physics: &CutPhysics) -> Option<[&Dual; 3]> {
+    physics.size_exponent.as_ref().map(|p| [&p[0], &p[1], &p[2]])
+}
+
+/// Forces by the size exponent of each direction: `sample` gives all directions for one exponent, `take` puts direction k of another
+/// sample in the place of what is there.
+fn by_direction<T>(
+    physics: &CutPhysics,
+    sample: impl Fn(Option<f64>) -> T,
+    take: impl Fn(&mut T, &T, usize),
+) -> T {
+    let Some(exponents) = exponents(physics) else {
+        return sample(None);
+    };
+    let [tangential, others @ ..] = exponents.map(|p| p.value);
+    let mut all = sample(Some(tangential));
+    for (k, exponent) in (1..).zip(others) {
+        if exponent != tangential {
+            take(&mut all, &sample(Some(exponent)), k);
+        }
+    }
+    all
+}
+
+fn chip_law(physics: &CutPhysics, exponent: Option<f64>) -> ChipLaw {
     ChipLaw {
-        exponent: physics.size_exponent.as_ref().map(|p| p.value),
+        exponent,
         runout: physics
             .runout
             .as_ref()
@@ -386,20 +447,12 @@ pub(crate) fn drilling_forces(
     parameters: usize,
 ) -> Forces {
     let mut forces = Forces::zero(cut.block_s.len(), parameters);
-    let h = Dual::constant(drill.geometry.chip_thickness_mm());
-    let h = match &physics.size_exponent {
-        // h (h / reference)^−p
-        Some(p) => {
-            let log = (h.value / ChipLaw::REFERENCE_MM).ln();
-            p.scale(-log).exp().scale(h.value)
-        }
-        None => h,
-    };
+    let [h_of_torque, h_of_thrust, _] = counts_as(physics, drill.geometry.chip_thickness_mm());
     let k = &physics.coefficient;
     let (thrust, torque) = (ForceAxis::Z.index(), ForceAxis::Mz.index());
     let mut terms = vec![
-        (torque, DrillTerm::Torque, &(&k[0] * &h) + &k[1]),
-        (thrust, DrillTerm::Thrust, &(&k[2] * &h) + &k[3]),
+        (torque, DrillTerm::Torque, &(&k[0] * &h_of_torque) + &k[1]),
+        (thrust, DrillTerm::Thrust, &(&k[2] * &h_of_thrust) + &k[3]),
     ];
     if let Some(chisel) = physics.chisel_thrust_n.as_ref().filter(|_| drill.full_hole) {
         terms.push((thrust, DrillTerm::Chisel, chisel.clone()));
@@ -428,6 +481,17 @@ pub(crate) fn drilling_forces(
     forces
 }
 
+/// Thickness that a chip of `h_mm` counts as for the force in each direction, mm: h (h / reference)^−p.
+fn counts_as(physics: &CutPhysics, h_mm: f64) -> [Dual; 3] {
+    match exponents(physics) {
+        Some(exponents) if h_mm > 0.0 => {
+            let log = (h_mm / ChipLaw::REFERENCE_MM).ln();
+            exponents.map(|p| p.scale(-log).exp().scale(h_mm))
+        }
+        _ => std::array::from_fn(|_| Dual::constant(h_mm)),
+    }
+}
+
 /// Force of a turned cut on the recorded channels, the same over the whole turn, up to and with crosstalk.
 pub(crate) fn turning_forces(
     physics: &CutPhysics,
@@ -436,24 +500,13 @@ pub(crate) fn turning_forces(
     parameters: usize,
 ) -> Forces {
     let mut forces = Forces::zero(1, parameters);
-    // Thickness that the chip of each bit counts as.
-    let chips = edge.iter().map(|bit| {
-        let h = Dual::constant(bit.chip_mm);
-        match &physics.size_exponent {
-            // h (h / reference)^−p
-            Some(p) if bit.chip_mm > 0.0 => {
-                let log = (bit.chip_mm / ChipLaw::REFERENCE_MM).ln();
-                p.scale(-log).exp().scale(bit.chip_mm)
-            }
-            _ => h,
-        }
-    });
     let k = &physics.coefficient;
-    for (bit, chip) in edge.iter().zip(chips) {
+    for bit in edge {
+        let chip = counts_as(physics, bit.chip_mm);
         for direction in 0..3 {
             let along =
                 [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(|axis| bit.directions(axis)[direction]);
-            let force = (&(&k[direction] * &chip) + &k[direction + 3]).scale(bit.length_mm);
+            let force = (&(&k[direction] * &chip[direction]) + &k[direction + 3]).scale(bit.length_mm);
             for (channel, row) in dyno_from_tool.iter().enumerate() {
                 let share: f64 = row.iter().zip(along).map(|(a, d)| a * d).sum();
                 forces.add(channel, &force.scale(share), &[1.0]);
@@ -636,8 +689,10 @@ mod tests {
     #[test]
     fn slopes_of_milling_forces_are_their_differences() {
         type Change = fn(&mut CutPhysics, &[Dual]);
-        let changes: [(&str, Change); 7] = [
-            ("size", |p, d| p.size_exponent = Some(d[6].clone())),
+        let changes: [(&str, Change); 8] = [
+            ("size", |p, d| {
+                p.size_exponent = Some([d[6].clone(), d[6].clone(), d[6].clone()])
+            }),
             ("runout", |p, d| {
                 let (offset_mm, angle_rad) = (d[7].clone(), d[8].clone());
                 p.runout = Some(Runout { offset_mm, angle_rad });
@@ -666,12 +721,21 @@ mod tests {
                 mixing[1][0] = d[14].clone();
                 p.tilt = Some(mixing);
             }),
+            ("sizes", |p, d| {
+                p.size_exponent = Some([d[6].clone(), d[15].clone(), d[16].clone()])
+            }),
         ];
         let mut theta = METAL.to_vec();
-        theta.extend([0.25, 0.006, 0.5, 0.004, 0.05, 1e-4, 900.0, 0.05, 0.03]);
+        theta.extend([0.25, 0.006, 0.5, 0.004, 0.05, 1e-4, 900.0, 0.05, 0.03, 0.4, 0.1]);
         let data = milled(METAL, &MILLED[1..2]);
         let (cut, milling, unit) = mill(&data);
-        let together = [vec![0, 2], vec![1, 3], vec![4, 5, 6], vec![0, 1, 2, 3, 4, 5, 6]];
+        let together = [
+            vec![0, 2],
+            vec![1, 3],
+            vec![1, 7],
+            vec![4, 5, 6],
+            vec![0, 1, 2, 3, 4, 5, 6],
+        ];
         let alone = (0..changes.len()).map(|i| vec![i]);
         for which in alone.chain(together) {
             let forces = |theta: &[f64], count: usize| {
@@ -798,7 +862,7 @@ mod tests {
     /// K ∝ (h / 0.1 mm)^−p: of 0.2 mm, a chip counts as 0.2 · 2^−p. At 0.1 mm nothing changes.
     #[test]
     fn thin_chips_are_harder_in_turning_and_drilling() {
-        let exponent = Dual::variable(0.3, 0, 1);
+        let exponent = [0; 3].map(|_| Dual::variable(0.3, 0, 1));
         for (feed, factor) in [(0.1, 1.0), (0.2, 2f64.powf(-0.3))] {
             let data = turned(METAL, &[feed]);
             let CutKind::Turning { edge } = &data.cuts[0].kind else {

@@ -2,8 +2,8 @@
 
 use super::form::bounds::Bounds;
 use super::form::section::Section;
+use crate::Result;
 use crate::data::{Tool, Tooth};
-use crate::{Error, Result};
 
 const KEYS: [&str; 3] = ["pitch_deg", "tooth_helix_deg", "tooth_radius_offset_mm"];
 
@@ -70,17 +70,6 @@ fn of_each_tooth(tool: &Section<'_>, key: &str, bounds: Bounds, teeth: usize) ->
 pub(super) fn mean_helix_deg(teeth: &[Tooth]) -> f64 {
     let sum: f64 = teeth.iter().map(|t| t.helix_deg).sum();
     sum / teeth.len().max(1) as f64
-}
-
-/// No model here has both.
-pub(super) fn on_a_shaped_edge(tool: &Section<'_>) -> Error {
-    let key = KEYS.into_iter().find(|key| tool.has(key)).unwrap_or(KEYS[0]);
-    tool.error(
-        key,
-        "teeth that differ are modelled on straight edges only, and this tool has a corner radius, a ball end or a lead angle",
-    )
-    .remedy("take it out: averages over whole turns then hold as long as every tooth cuts")
-    .into()
 }
 
 /// Teeth of different helix must not meet within the depth of a cut.

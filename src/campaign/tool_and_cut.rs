@@ -69,9 +69,6 @@ pub(super) fn tool(top: &Section<'_>) -> Result<Option<Tool>> {
             .unwrap_or(USUAL_CHISEL_EDGE_ANGLE_DEG),
         each_tooth,
     };
-    if !tool.each_tooth.is_empty() && !tool.has_straight_edge() {
-        return Err(each_tooth::on_a_shaped_edge(&section));
-    }
     Ok(Some(tool))
 }
 

@@ -53,6 +53,8 @@ const MOST_COSINES: usize = 24;
 const LEAST_IN_STEP: f64 = 0.8;
 /// Speeds further off than this show in the spectrum as a wrong speed or a wrong number of teeth, and nothing is removed.
 const FURTHEST: f64 = 0.03;
+/// Turns of the line from one turn of the tool to the next, above what is stated, up to which the count is sure.
+const SURE_STEP: f64 = 0.4;
 /// Smear of the followed line, rad of its own phase (rms), from which on it is reported: at 0.15 the line's average loses 1 %.
 const WORTH_TELLING: f64 = 0.15;
 /// Standard deviations that a part of the profile must exceed zero by to be reported.
@@ -361,7 +363,12 @@ impl SpindleTrack {
     }
 
     fn is_told(&self) -> bool {
-        self.offset.abs() < FURTHEST && self.is_worth_telling(&self.parts())
+        // Of a speed that droops so far that it passes the stated one the mean lies further off, as far as steps from turn to turn are
+        // sure by a whole one.
+        let changes = 0.5 * self.droop.abs() + 2.0 * self.wander;
+        let is_sure = self.order as f64 * (self.offset.abs() + changes) < SURE_STEP;
+        let is_near = self.offset.abs() < FURTHEST || (is_sure && self.offset.abs() < changes + FURTHEST);
+        is_near && self.is_worth_telling(&self.parts())
     }
 
     fn is_worth_telling(&self, parts: &[(f64, f64)]) -> bool {
@@ -374,30 +381,30 @@ impl SpindleTrack {
         self.parts().map(|(value, std)| value.abs() > SIGMAS * std)
     }
 
-    /// The same without the wander; `None` where offset and droop alone are not worth telling, or the wander is: the droop is
-    /// part of it then.
-    pub fn without_wander(&self) -> Option<SpindleTrack> {
-        // Radians of the tool's turn over the window: the integral of the speed.
-        let turns = self.turns as f64;
-        let coefficients = vec![PI * turns * self.offset, PI * turns * self.droop / 8.0];
-        let count = self.coefficients.len().max(coefficients.len());
-        let at = |of: &[f64], j: usize| of.get(j).copied().unwrap_or(0.0);
-        let wander: Vec<f64> = (0..count)
-            .map(|j| at(&self.coefficients, j) - at(&coefficients, j))
-            .collect();
-        if self.order as f64 * smear_rad(&wander, self.turns) > WORTH_TELLING {
-            return None;
+    /// Whether droop or wander are worth telling, and not an offset alone.
+    pub fn varies(&self) -> bool {
+        self.order as f64 * self.varying_rad() > WORTH_TELLING
+            && self.parts()[1..]
+                .iter()
+                .any(|(value, std)| value.abs() > SIGMAS * std)
+    }
+
+    /// As [`Self::smear_rad`], against the mean speed instead of the stated one.
+    pub fn varying_rad(&self) -> f64 {
+        let mut own = self.coefficients.clone();
+        if let Some(first) = own.first_mut() {
+            *first -= PI * self.turns as f64 * self.offset;
         }
-        let straight = SpindleTrack {
-            smear_rad: smear_rad(&coefficients, self.turns),
-            wander: 0.0,
-            wander_std: 0.0,
-            coefficients,
-            ..self.clone()
-        };
-        straight
-            .is_worth_telling(&straight.parts()[..2])
-            .then_some(straight)
+        smear_rad(&own, self.turns)
+    }
+
+    /// Root mean square of the speed's changes over the stated speed, and its standard error.
+    pub fn variation(&self) -> (f64, f64) {
+        // A straight line from −d/2 to d/2 has d/√12.
+        let (droop, droop_std) = (self.droop / 12f64.sqrt(), self.droop_std / 12f64.sqrt());
+        let all = droop.hypot(self.wander);
+        let std = ((droop * droop_std).powi(2) + (self.wander * self.wander_std).powi(2)).sqrt() / all;
+        (all, std)
     }
 
     /// Angle ahead of the stated speed at a sample, rad, zero at the middle of the window; outside it stays what it is at its

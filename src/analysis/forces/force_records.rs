@@ -69,7 +69,7 @@ impl<S: Sample> ReadRecord<S> {
         match self.reading(campaign, cut) {
             Ok(reading) => {
                 let waveform = waveform(campaign, cut, &reading);
-                (Ok(reading.averages), waveform, digest)
+                (Ok(reading.analysis), waveform, digest)
             }
             Err(error) => (Err(error.clone()), Err(error), digest),
         }
@@ -153,7 +153,7 @@ fn batches(sizes: &[u64]) -> Vec<Range<usize>> {
 
 fn waveform<S: Sample>(campaign: &Campaign, cut: usize, reading: &RecordReading<S>) -> Result<Waveform> {
     let tool = cutting_trials(campaign)?.tool;
-    let (record, analysis) = (&reading.waveform_record, &reading.waveform);
+    let (record, analysis) = (&reading.record, &reading.analysis);
     let data = CutData::new(tool, (cut, &campaign.cuts[cut]), record, analysis)?;
     Ok((data, analysis.notices.clone()))
 }
@@ -325,33 +325,73 @@ mod tests {
         for i in 0..cuts.len() {
             let as_read = read_record(&campaign, i).unwrap().record;
             let reading = read_record(&campaign, i).unwrap().reading(&campaign, i).unwrap();
-            assert_eq!(reading.averages.spindle, None, "cut {i}");
+            assert_eq!(reading.analysis.spindle, None, "cut {i}");
             let samples = |record: &TimeRecord| record.channels[0].samples.clone();
-            assert_eq!(samples(&reading.waveform_record), samples(&as_read));
+            assert_eq!(samples(&reading.record), samples(&as_read));
         }
     }
 
     #[test]
-    fn what_wanders_is_left_to_diagnose() {
-        type Speed = (&'static dyn Fn(f64) -> f64, bool);
-        let speeds: [Speed; 2] = [
-            (&|_| 1.007, false),
-            (&|t| 1.0 + 0.01 * (TAU * 1.3 * t).sin(), true),
+    fn what_wanders_is_put_in_step_and_told_by_diagnose() {
+        type Speed = (&'static dyn Fn(f64) -> f64, Option<f64>);
+        // Root mean square by which the tool is early or late, rad of its turn: ∫ 2π n ε sin(2πft) dt has the amplitude n ε / f.
+        let speeds: [Speed; 3] = [
+            (&|_| 1.0, None),
+            (&|_| 1.007, None),
+            (
+                &|t| 1.0 + 0.01 * (TAU * 1.3 * t).sin(),
+                Some(20.0 * 0.01 / 1.3 * std::f64::consts::FRAC_1_SQRT_2),
+            ),
         ];
-        for (speed, wanders) in speeds {
+        for (speed, varies) in speeds {
             let dir = tempfile::tempdir().unwrap();
-            let cut = MadeCut {
+            let cuts = [0.05, 0.1, 0.16].map(|feed_mm| MadeCut {
                 rpm: 1200.0,
-                feed_mm: 0.1,
+                feed_mm,
                 speed,
-            };
-            let campaign = write_campaign(dir.path(), &[cut], &|_, _, _, _, _| 0.0);
-            let as_read = read_record(&campaign, 0).unwrap().record;
-            let reading = read_record(&campaign, 0).unwrap().reading(&campaign, 0).unwrap();
-            assert!(reading.waveform.spindle.is_some(), "{wanders}");
-            let untouched = reading.waveform_record.channels[0].samples == as_read.channels[0].samples;
-            assert_eq!(untouched, wanders);
+            });
+            let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
+            let data = CuttingData::on(&Workbench::new(&campaign), Process::Milling).unwrap();
+            let check = crate::discrepancy::setup::examine_cutting(&data, || None).unwrap();
+            let found = check
+                .findings
+                .iter()
+                .find(|f| f.kind == "spindle-speed-variation");
+            assert_eq!(found.is_some(), varies.is_some(), "{:?}", check.findings);
+            assert_eq!(check.likely(), None);
+            if let (Some(found), Some(rad)) = (found, varies) {
+                let value = found.value.unwrap();
+                assert!((value / rad - 1.0).abs() < 0.2, "{value} {rad}");
+            }
         }
+    }
+
+    /// From the stated speed down by a tenth: the mean is further off than a wrong number would be believed to be.
+    #[test]
+    fn a_spindle_that_gives_way_by_a_tenth_is_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let cuts = [0.05, 0.1, 0.16].map(|feed_mm| MadeCut {
+            rpm: 1200.0,
+            feed_mm,
+            // From the middle of the cut.
+            speed: &|t| 0.95 - 0.1 * t / CUT_S,
+        });
+        let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
+        let found = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
+        assert!(worst(&found) < 0.01, "{}", worst(&found));
+        for cut in &found.cuts {
+            let track = cut.spindle.as_ref().unwrap();
+            assert!(
+                (track.offset + 0.05).abs() < 0.01 && (track.droop + 0.1).abs() < 0.03,
+                "{track:?}"
+            );
+        }
+        assert!(
+            !found
+                .warnings
+                .iter()
+                .any(|w| w.contains("sampling rate in the files is wrong"))
+        );
     }
 
     #[test]
@@ -363,7 +403,7 @@ mod tests {
             let campaign = Campaign::load(&dir).unwrap();
             for i in 0..campaign.cuts.len() {
                 let reading = read_record(&campaign, i).unwrap().reading(&campaign, i).unwrap();
-                assert_eq!(reading.averages.spindle, None, "{name}, cut {i}");
+                assert_eq!(reading.analysis.spindle, None, "{name}, cut {i}");
             }
         }
     }

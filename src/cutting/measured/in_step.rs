@@ -9,19 +9,16 @@ use crate::data::{Process, Sample, TimeRecord, Tool};
 use crate::signal::{SpindleTrack, spindle_track};
 use crate::text::figures;
 
-pub(crate) const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are averaged by the angle that the forces show (waveforms \
-     only where it does not wander); correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
+pub(crate) const OTHER_SPEED: &str = "the spindle did not keep the stated speed: turns are averaged by the angle that the forces show; \
+     correct spindle_rpm (and the feed per tooth that goes with it), and look why it changes \
      under load";
 
 /// What one record says, put in step with the stated speed.
 pub struct RecordReading<S = f64> {
-    /// For averages over turns: all changes of the speed are taken out.
-    pub averages: CutAnalysis,
-    /// For waveforms: the same, but where the speed wanders the record stays as it is, for `diagnose` to find that as a
-    /// mistake of the setup (`spindle-speed-variation`).
-    pub waveform: CutAnalysis,
-    /// The record that `waveform` was read off.
-    pub waveform_record: TimeRecord<S>,
+    /// Averages over turns, windows and notices; with the track of a spindle that did not keep the stated speed.
+    pub analysis: CutAnalysis,
+    /// The record in step: all changes of the speed are taken out.
+    pub record: TimeRecord<S>,
 }
 
 /// Puts the record of one cut in step with the stated speed and reads it. `notices`: what is known of the record already.
@@ -34,40 +31,20 @@ pub fn analyse_in_step<S: Sample>(
     record: TimeRecord<S>,
     mut notices: Vec<Notice>,
 ) -> Result<RecordReading<S>> {
-    let as_read = analyse_cut(trials, index, &record)?;
-    let Some(found) = followed(trials.tool, &as_read, &record) else {
-        let mut averages = as_read;
-        averages.notices.extend(notices);
-        return Ok(RecordReading {
-            waveform: averages.clone(),
-            averages,
-            waveform_record: record,
+    let mut analysis = analyse_cut(trials, index, &record)?;
+    let mut record = record;
+    if let Some(found) = followed(trials.tool, &analysis, &record) {
+        let file = &trials.cuts[index].file;
+        notices.push(Notice {
+            kind: OTHER_SPEED,
+            detail: in_words(&found, &file.display().to_string(), analysis.spindle_rpm),
         });
-    };
-    let file = &trials.cuts[index].file;
-    notices.push(Notice {
-        kind: OTHER_SPEED,
-        detail: in_words(&found, &file.display().to_string(), as_read.spindle_rpm),
-    });
-    let told = |mut analysis: CutAnalysis| {
-        analysis.spindle = Some(found.clone());
-        analysis.notices.extend(notices.iter().cloned());
-        analysis
-    };
-    let averages = analyse_cut(trials, index, &turned_evenly(record.clone(), &found))?;
-    let (waveform_record, waveform) = match found.without_wander() {
-        Some(track) => {
-            let even = turned_evenly(record, &track);
-            let analysis = analyse_cut(trials, index, &even)?;
-            (even, analysis)
-        }
-        None => (record, as_read),
-    };
-    Ok(RecordReading {
-        averages: told(averages),
-        waveform: told(waveform),
-        waveform_record,
-    })
+        record = turned_evenly(record, &found);
+        analysis = analyse_cut(trials, index, &record)?;
+        analysis.spindle = Some(found);
+    }
+    analysis.notices.extend(notices);
+    Ok(RecordReading { analysis, record })
 }
 
 fn turned_evenly<S: Sample>(mut record: TimeRecord<S>, track: &SpindleTrack) -> TimeRecord<S> {

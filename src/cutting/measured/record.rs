@@ -15,7 +15,8 @@ use crate::cutting::measured::cut_analysis::{
 };
 use crate::cutting::measured::leak::high_pass;
 use crate::cutting::measured::teeth::{
-    CERTAIN, idle_tooth, one_tooth_alone, parts_of_turn, tooth_back_mm, tooth_passing_too_weak,
+    CERTAIN, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn, tooth_back_mm,
+    tooth_passing_too_weak,
 };
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, Sample, TimeRecord, Tool};
@@ -52,6 +53,9 @@ const TOOTH_STANDS_BACK: &str = "one tooth cuts less than the others and the nex
 const TEETH_DIFFER: &str = "the teeth cut unevenly: the tool runs out, or one of them is chipped or set low; near the ends of the \
      immersion the lower one does not cut, so that the edge coefficients come out low (tooth_radius_offset_mm in [tool] takes it into \
      account)";
+const OTHER_TEETH: &str = "the teeth do not cut as pitch_deg and tooth_radius_offset_mm of [tool] have it, so that coefficients come out \
+     wrong, those of the edge most: look at the teeth; the lists go in the order in which they cut, a radius of 0 is that of a tooth that \
+     stands like the first";
 const IMPOSSIBLE: &str = "no machine tool bears such a load: the unit or the gain of the channel is wrong, or its values are no forces \
      (unit and gain in a [[channel]] of campaign.toml)";
 /// N (torques: N·m).
@@ -470,7 +474,7 @@ fn teeth_notice<S: Sample>(
     record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
 ) {
-    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry).filter(|m| m.places.is_empty()) else {
+    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry) else {
         return;
     };
     let rate = record.sample_rate_hz;
@@ -519,6 +523,26 @@ fn teeth_notice<S: Sample>(
         return;
     }
     let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
+    if !milling.places.is_empty() {
+        let other = other_than_listed(
+            &milling,
+            [&orders[0], &orders[1]],
+            [&std[0], &std[1]],
+            mean,
+            zero_is_known,
+        );
+        if let Some(other) = other {
+            notices.push(Notice {
+                kind: OTHER_TEETH,
+                detail: format!(
+                    "the part of the force that comes back once per turn is {} N, by the list {} N",
+                    figures(other.measured, 2),
+                    figures(other.listed, 2)
+                ),
+            });
+        }
+        return;
+    }
     let known_mean = zero_is_known.then_some(mean);
     let slow = tooth_passing_too_weak(&milling, [&orders[0], &orders[1]], [&std[0], &std[1]], known_mean);
     if let Some(slow) = slow {

@@ -230,6 +230,80 @@ pub(crate) fn tooth_back_mm(
     (told && back.is_finite()).then_some(back)
 }
 
+/// Of what comes back once per turn and not once per tooth, N (root of the sum of the squares of the amplitudes).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct AgainstList {
+    pub measured: f64,
+    pub listed: f64,
+}
+
+/// Parts of the power of both by which they differ: another list, not another metal or edge.
+const OTHER_TEETH: f64 = 0.5;
+/// Power against that by the list below which teeth are listed that cut nothing, and cut: an offset of the axis adds as a rule.
+const LESS: f64 = 0.4;
+/// Amplitude against the strongest line below which the teeth differ too little to speak of.
+const LITTLE: f64 = 0.15;
+/// Turns of the tool that are tried for each of its orders.
+const TURNS_TRIED: usize = 16;
+
+/// Do the teeth cut otherwise than the tool's list of pitches and radii has it? `orders`: from 1 on, of the forces in tool axes x and y,
+/// N, and their `std`. What an offset of the tool's axis makes is left out where it can be told apart (four teeth and more).
+pub(crate) fn other_than_listed(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<AgainstList> {
+    let teeth = cut.teeth;
+    let count = orders.iter().map(|o| o.len()).min()?;
+    if cut.places.is_empty() || teeth < 2 || count < teeth || std.iter().any(|s| s.len() < count) {
+        return None;
+    }
+    let unit = cut.linear(count);
+    let single = single_tooth(cut).closed_form(teeth);
+    let (k_t, k_r) = direction(&single, teeth as f64, orders, mean, zero_is_known)?;
+    let listed = |axis: usize, k: usize| unit[0][axis][k] * k_t + unit[1][axis][k] * k_r;
+    let both = || (0..2).flat_map(|axis| (1..=count).map(move |k| (axis, k)));
+    // The tool may stand anywhere when the record begins.
+    let turned = |turn: f64, k: usize| Complex64::from_polar(1.0, -turn * k as f64);
+    let tried = TURNS_TRIED * count;
+    let alike = |turn: f64| -> f64 {
+        let products =
+            both().map(|(axis, k)| (listed(axis, k) * turned(turn, k)).conj() * orders[axis][k - 1]);
+        products.sum::<Complex64>().re
+    };
+    let turn = (0..tried)
+        .map(|step| TAU * step as f64 / tried as f64)
+        .max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
+    let of_the_turn = |k: usize| match k % teeth {
+        0 => false,
+        rest => teeth < 4 || (rest != 1 && rest != teeth - 1),
+    };
+    // Power measured, by the list, of their difference, and of the noise.
+    let sums = |which: &dyn Fn(usize) -> bool| {
+        let mut sums = [0.0; 4];
+        for (axis, k) in both().filter(|(_, k)| which(*k)) {
+            let (own, by_list) = (orders[axis][k - 1], listed(axis, k) * turned(turn, k));
+            let powers = [own.norm_sqr(), by_list.norm_sqr(), (own - by_list).norm_sqr()];
+            sums.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
+            sums[3] += std[axis][k - 1].powi(2);
+        }
+        sums
+    };
+    let strongest = (1..=count).map(|k| power_of(orders, k)).fold(0.0, f64::max);
+    let counts =
+        |apart: f64, noise: f64| apart > LITTLE * LITTLE * strongest && apart > CERTAIN * CERTAIN * noise;
+    let [own, by_list, apart, noise] = sums(&of_the_turn);
+    let [all, all_by_list, all_apart, all_noise] = sums(&|k| !k.is_multiple_of(teeth));
+    let other = apart > OTHER_TEETH * (own + by_list) && counts(apart, noise);
+    let less = all < LESS * all_by_list && counts(all_apart, all_noise);
+    (other || less).then_some(AgainstList {
+        measured: all.sqrt(),
+        listed: all_by_list.sqrt(),
+    })
+}
+
 /// Of order `k` of the forces in tool axes x and y, N².
 fn power_of(orders: [&[Complex64]; 2], k: usize) -> f64 {
     orders.iter().map(|o| o[k - 1].norm_sqr()).sum()
@@ -301,6 +375,52 @@ mod tests {
             lag_rad: 0.15,
             shape: None,
             places: Vec::new(),
+        }
+    }
+
+    /// One tooth of four missing: told by the right list, by one with its neighbour missing as well, and where none is missing.
+    #[test]
+    fn teeth_that_cut_otherwise_than_the_list_has_it_are_told() {
+        let with = |radii: [f64; 4]| {
+            let mut own = cut(4, 20.0, 150.0);
+            own.places = own.places_or_even();
+            own.places
+                .iter_mut()
+                .zip(radii)
+                .for_each(|(p, r)| p.radius_mm = r);
+            own
+        };
+        let [none, one, two] = [[0.0; 4], [0.0, -2.0, 0.0, 0.0], [0.0, -2.0, -2.0, 0.0]];
+        for (truth, list, told) in [
+            (one, one, false),
+            (one, two, true),
+            (none, one, true),
+            (two, two, false),
+            // An offset of the axis besides is no fault of the list.
+            ([0.01, -2.0, -0.01, 0.0], one, false),
+        ] {
+            let unit = with(truth).own_teeth(8, None, false).unit;
+            // A tool that stands 50° on, 1900 and 700 N/mm² and edges of 20 and 25 N/mm.
+            let of = |axis: usize| -> Vec<Complex64> {
+                let sum = |k: usize| {
+                    unit[0][axis][k] * 1900.0
+                        + unit[1][axis][k] * 700.0
+                        + unit[3][axis][k] * 20.0
+                        + unit[4][axis][k] * 25.0
+                };
+                let turned = |k: usize| sum(k) * Complex64::from_polar(1.0, -0.87 * k as f64);
+                (0..=8).map(turned).collect()
+            };
+            let (x, y) = (of(0), of(1));
+            let std = [0.1; 8];
+            let found = other_than_listed(
+                &with(list),
+                [&x[1..], &y[1..]],
+                [&std, &std],
+                [x[0].re, y[0].re],
+                true,
+            );
+            assert_eq!(found.is_some(), told, "{truth:?} {list:?} {found:?}");
         }
     }
 
@@ -425,7 +545,7 @@ mod tests {
             places: radii.iter().enumerate().map(place).collect(),
             ..cut.clone()
         };
-        let unit = own.own_teeth(teeth, false).unit;
+        let unit = own.own_teeth(teeth, None, false).unit;
         let coefficient = [900.0, 350.0, 0.0, 15.0, 18.0, 0.0];
         let order = |axis: usize, k: usize| -> Complex64 {
             let force: Complex64 = (0..6).map(|c| unit[c][axis][k] * coefficient[c]).sum();

@@ -4,13 +4,14 @@
 //! the passes before it left, h_j(φ) = min_m [ (a_{j+m} − a_j)/(2π/N) · c sin φ + r_j − r_{j+m} ], m = 1..N, and nothing where that
 //! is negative (Kline & DeVor 1983 for radii; Altintas, Engin, Budak 1999 for angles). As a function of sin φ this is a minimum of
 //! straight lines, so the immersion falls into stretches on which the forces have the closed forms of alike teeth. Radii and angles
-//! hold over the whole depth: a helix of one angle is a factor, as there.
+//! hold over the whole depth: a helix of one angle is a factor, as there. An edge of another shape is summed up part by part, on each of
+//! which the offset of the tool's axis is a radius of each tooth.
 
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::milling::{ImmersionWindow, MillingCut, Turns, UnitForces};
+use super::milling::{EdgePart, ImmersionWindow, MillingCut, Turns, UnitForces, put};
 use super::tooth_place::ToothPlace;
 use crate::data::Immersion;
 
@@ -23,6 +24,8 @@ pub struct OwnTeethForces {
     pub by_radius: Vec<UnitForces>,
     /// By the angle of each tooth ahead of tooth 0, per rad; empty where none were asked for.
     pub by_angle: Vec<UnitForces>,
+    /// By the offset of the tool's axis, per mm, and its direction, per rad; empty where none were asked for.
+    pub by_runout: Vec<UnitForces>,
 }
 
 /// A part of the immersion on which a tooth cuts what one and the same earlier pass left: h = `slope` sin φ + `offset`.
@@ -60,33 +63,88 @@ impl MillingCut {
         self.places.iter().all(|p| p.lag_rad == self.lag_rad)
     }
 
-    /// Forces of the teeth as [`Self::places`] has them (one helix, straight edge), linear in the chip thickness.
-    pub fn own_teeth(&self, orders: usize, derivatives: bool) -> OwnTeethForces {
+    /// Forces of the teeth as [`Self::places`] has them (one helix), linear in the chip thickness. `runout`: offset of the tool's axis,
+    /// mm, and its direction from tooth 0, rad; on a straight edge, where it changes along the edge, [`Self::sampled`] has it.
+    pub fn own_teeth(&self, orders: usize, runout: Option<[f64; 2]>, derivatives: bool) -> OwnTeethForces {
         let places = self.places_or_even();
-        let teeth = places.len();
-        let slopes = if derivatives { teeth } else { 0 };
+        let slopes = |count: usize| -> Vec<UnitForces> {
+            let count = if derivatives { count } else { 0 };
+            (0..count).map(|_| Self::nothing(orders)).collect()
+        };
         let mut all = OwnTeethForces {
             unit: Self::nothing(orders),
-            by_radius: (0..slopes).map(|_| Self::nothing(orders)).collect(),
-            by_angle: (0..slopes).map(|_| Self::nothing(orders)).collect(),
+            by_radius: slopes(places.len()),
+            by_angle: slopes(places.len()),
+            by_runout: slopes(if runout.is_some() { 2 } else { 0 }),
         };
+        for part in self.edge_parts(orders, 1) {
+            let Some([offset_mm, angle_rad]) = runout else {
+                self.add_teeth(&mut all, &part, &places, None, derivatives);
+                continue;
+            };
+            let from_offset = |place: &ToothPlace| angle_rad - place.ahead_rad + self.lag_rad * part.height;
+            let mut eccentric = places.clone();
+            for place in &mut eccentric {
+                place.radius_mm += offset_mm * from_offset(place).cos();
+            }
+            let by_runout: Vec<[f64; 2]> = places
+                .iter()
+                .map(|place| {
+                    let (sin, cos) = from_offset(place).sin_cos();
+                    [cos, -offset_mm * sin]
+                })
+                .collect();
+            self.add_teeth(&mut all, &part, &eccentric, Some(&by_runout), derivatives);
+        }
+        all
+    }
+
+    /// One part of the edge. `by_runout`: change of each tooth's radius by the offset of the axis and by its direction.
+    fn add_teeth(
+        &self,
+        all: &mut OwnTeethForces,
+        part: &EdgePart,
+        places: &[ToothPlace],
+        by_runout: Option<&[[f64; 2]]>,
+        derivatives: bool,
+    ) {
+        let teeth = places.len();
+        let orders = part.factors.len() - 1;
         let feed_per_rad = self.feed_per_tooth_mm * teeth as f64 / TAU;
-        let helix: Vec<Complex64> = (0..=orders).map(|n| self.helix_at(n as i64)).collect();
+        let add = |unit: &mut UnitForces, n: usize, cutting: [Complex64; 3], edge: [Complex64; 3]| {
+            let [depth, length] = part.factors[n];
+            let (cutting, edge) = (cutting.map(|v| v * depth), edge.map(|v| v * length));
+            put(unit, n, &cutting, &edge, part.kappa);
+        };
+        // The radius of a tooth, which runout changes, too.
+        let add_radius = |all: &mut OwnTeethForces, j: usize, n: usize, values: [[Complex64; 3]; 2]| {
+            let [cutting, edge] = values;
+            add(&mut all.by_radius[j], n, cutting, edge);
+            for (i, weight) in by_runout.iter().flat_map(|by| by[j].iter().enumerate()) {
+                let weighted = |set: [Complex64; 3]| set.map(|v| v * weight);
+                add(&mut all.by_runout[i], n, weighted(cutting), weighted(edge));
+                // A tooth further ahead stands elsewhere against the offset.
+                if i == 1 {
+                    let minus = |set: [Complex64; 3]| set.map(|v| v * -weight);
+                    add(&mut all.by_angle[j], n, minus(cutting), minus(edge));
+                }
+            }
+        };
         for (j, place) in places.iter().enumerate() {
             let ahead = Turns::new(-place.ahead_rad, orders);
-            for stretch in self.stretches(&places, j) {
+            for stretch in self.stretches(part.immersion, places, j) {
                 let before = (j + stretch.passes) % teeth;
                 let Immersion { start_rad, exit_rad } = stretch.immersion;
                 let window = ImmersionWindow::new(stretch.immersion, orders);
                 for n in 0..=orders {
-                    let turn = helix[n] * ahead.at(n as i64);
+                    let turn = ahead.at(n as i64);
                     let integral = window.integrals(n);
                     let cutting: [Complex64; 3] = std::array::from_fn(|d| {
                         turn * (integral.by_sine[d] * stretch.slope_mm
                             + integral.plain[d] * stretch.offset_mm)
                     });
                     let edge = integral.plain.map(|v| turn * v);
-                    put(&mut all.unit, n, &cutting, &edge);
+                    add(&mut all.unit, n, cutting, edge);
                     if !derivatives {
                         continue;
                     }
@@ -111,23 +169,22 @@ impl MillingCut {
                     let by_slope = integral.by_sine.map(|v| turn * v * feed_per_rad);
                     let edge_by_slope = grows[1].map(|v| v * feed_per_rad);
                     if before != j {
-                        put(&mut all.by_radius[j], n, &by_offset, &grows[0]);
-                        put(&mut all.by_angle[before], n, &by_slope, &edge_by_slope);
+                        add_radius(all, j, n, [by_offset, grows[0]]);
+                        add(&mut all.by_angle[before], n, by_slope, edge_by_slope);
                         let minus = |set: [Complex64; 3]| set.map(|v| -v);
-                        put(&mut all.by_radius[before], n, &minus(by_offset), &minus(grows[0]));
-                        put(&mut all.by_angle[j], n, &minus(by_slope), &minus(edge_by_slope));
+                        add_radius(all, before, n, [minus(by_offset), minus(grows[0])]);
+                        add(&mut all.by_angle[j], n, minus(by_slope), minus(edge_by_slope));
                     }
                     let turning = Complex64::new(0.0, n as f64);
                     let moved = |set: [Complex64; 3]| set.map(|v| v * turning);
-                    put(&mut all.by_angle[j], n, &moved(cutting), &moved(edge));
+                    add(&mut all.by_angle[j], n, moved(cutting), moved(edge));
                 }
             }
         }
-        all
     }
 
     /// What tooth `j` cuts over the immersion, stretch by stretch.
-    fn stretches(&self, places: &[ToothPlace], j: usize) -> Vec<Stretch> {
+    fn stretches(&self, immersion: Immersion, places: &[ToothPlace], j: usize) -> Vec<Stretch> {
         let teeth = places.len();
         let pitch = TAU / teeth as f64;
         let here = places[j];
@@ -140,7 +197,7 @@ impl MillingCut {
                 (ahead / pitch * self.feed_per_tooth_mm, offset)
             })
             .collect();
-        let Immersion { start_rad, exit_rad } = self.immersion;
+        let Immersion { start_rad, exit_rad } = immersion;
         let mut ends = vec![start_rad, exit_rad];
         let mut at_sine = |sine: f64| {
             if (0.0..=1.0).contains(&sine) {
@@ -200,20 +257,10 @@ impl MillingCut {
     }
 }
 
-fn put(unit: &mut UnitForces, n: usize, cutting: &[Complex64; 3], edge: &[Complex64; 3]) {
-    for (first, [cos, sin, one]) in [(0, cutting), (3, edge)] {
-        unit[first][0][n] -= cos;
-        unit[first][1][n] += sin;
-        unit[first + 1][0][n] -= sin;
-        unit[first + 1][1][n] -= cos;
-        unit[first + 2][2][n] += one;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutting::waveform::ChipLaw;
+    use crate::cutting::waveform::{ChipLaw, EdgeShape};
 
     fn cut(immersion_deg: [f64; 2], pitches_deg: &[f64], radii_mm: &[f64]) -> MillingCut {
         let mut ahead = 0.0;
@@ -283,11 +330,11 @@ mod tests {
                         let turn = cut.helix_at(n as i64)
                             * Complex64::from_polar(share, n as f64 * (cut.places[j].ahead_rad - phi));
                         let edge = [phi.cos(), phi.sin(), 1.0].map(|d| turn * d);
-                        put(&mut sum, n, &edge.map(|v| v * h), &edge);
+                        put(&mut sum, n, &edge.map(|v| v * h), &edge, (1.0, 0.0));
                     }
                 }
             }
-            let off = worst(&sum, &cut.own_teeth(orders, false).unit);
+            let off = worst(&sum, &cut.own_teeth(orders, None, false).unit);
             assert!(off < 2e-4, "{:?}: {off}", cut.places);
         }
     }
@@ -297,14 +344,14 @@ mod tests {
     fn closed_form_equals_quadrature_and_alike_teeth() {
         for cut in cases() {
             let sampled = cut.sampled(24, ChipLaw::default(), false).unit;
-            let off = worst(&sampled, &cut.own_teeth(24, false).unit);
+            let off = worst(&sampled, &cut.own_teeth(24, None, false).unit);
             assert!(off < 3e-3, "{:?}: {off}", cut.places);
         }
         let mut alike = cut([0.0, 180.0], &[90.0; 4], &[0.0; 4]);
-        let own = alike.own_teeth(24, false).unit;
+        let own = alike.own_teeth(24, None, false).unit;
         alike.places.clear();
         assert!(worst(&alike.closed_form(24), &own) < 1e-12);
-        assert!(worst(&alike.own_teeth(24, false).unit, &own) < 1e-12);
+        assert!(worst(&alike.own_teeth(24, None, false).unit, &own) < 1e-12);
     }
 
     /// Teeth of one radius come into a slot with chips of no thickness: there a longer tooth changes what a shorter one does not, and no
@@ -319,12 +366,59 @@ mod tests {
         !alike || (cut.immersion.start_rad > 0.0 && cut.immersion.exit_rad < PI)
     }
 
+    fn by_difference(high: UnitForces, low: &UnitForces, step: f64) -> UnitForces {
+        let mut difference = high;
+        let values = difference.iter_mut().flatten().flatten();
+        for (a, b) in values.zip(low.iter().flatten().flatten()) {
+            *a = (*a - b) / (2.0 * step);
+        }
+        difference
+    }
+
+    fn relative(difference: &UnitForces, analytic: &UnitForces) -> f64 {
+        let values = analytic.iter().flatten().flatten();
+        worst(difference, analytic) / values.map(|v| v.norm()).fold(1.0, f64::max)
+    }
+
+    /// A bull nose whose axis stands off: by the offset, its direction and the angle of a tooth.
+    #[test]
+    fn runout_on_a_shaped_edge_has_the_derivatives_of_its_differences() {
+        let tool = crate::cutting::made_tools::endmill(1.0, 90.0);
+        let bull = MillingCut {
+            shape: EdgeShape::of(&tool),
+            ..cut(
+                [20.0, 160.0],
+                &[84.0, 98.0, 84.0, 94.0],
+                &[0.0, -0.02, 0.004, 0.011],
+            )
+        };
+        let own = bull.own_teeth(12, Some([0.01, 0.7]), true);
+        for (i, step) in [(0, 1e-7), (1, 1e-6)] {
+            let moved = |sign: f64| {
+                let mut runout = [0.01, 0.7];
+                runout[i] += sign * step;
+                bull.own_teeth(12, Some(runout), false).unit
+            };
+            let off = relative(&by_difference(moved(1.0), &moved(-1.0), step), &own.by_runout[i]);
+            assert!(off < 1e-3, "{i}: {off}");
+        }
+        for j in 0..4 {
+            let moved = |step: f64| {
+                let mut other = bull.clone();
+                other.places[j].ahead_rad += step;
+                other.own_teeth(12, Some([0.01, 0.7]), false).unit
+            };
+            let off = relative(&by_difference(moved(1e-6), &moved(-1e-6), 1e-6), &own.by_angle[j]);
+            assert!(off < 1e-3, "tooth {j}: {off}");
+        }
+    }
+
     #[test]
     fn derivatives_equal_differences() {
         let smooth: Vec<MillingCut> = cases().into_iter().filter(has_derivatives).collect();
         assert_eq!(smooth.len(), 4);
         for cut in smooth {
-            let own = cut.own_teeth(24, true);
+            let own = cut.own_teeth(24, None, true);
             for j in 0..cut.teeth {
                 // A missing tooth's radius changes nothing, a tooth on the verge of missing is not among the cases.
                 for (analytic, change) in [
@@ -337,22 +431,9 @@ mod tests {
                     let moved = |step: f64| {
                         let mut other = cut.clone();
                         change(&mut other.places[j], step);
-                        other.own_teeth(24, false).unit
+                        other.own_teeth(24, None, false).unit
                     };
-                    let step = 1e-6;
-                    let (high, low) = (moved(step), moved(-step));
-                    let mut difference = high;
-                    let values = difference.iter_mut().flatten().flatten();
-                    for (a, b) in values.zip(low.iter().flatten().flatten()) {
-                        *a = (*a - b) / (2.0 * step);
-                    }
-                    let size = analytic
-                        .iter()
-                        .flatten()
-                        .flatten()
-                        .map(|v| v.norm())
-                        .fold(1.0, f64::max);
-                    let off = worst(&difference, analytic) / size;
+                    let off = relative(&by_difference(moved(1e-6), &moved(-1e-6), 1e-6), analytic);
                     assert!(off < 1e-4, "tooth {j} of {:?}: {off}", cut.places);
                 }
             }

@@ -28,6 +28,8 @@ use crate::{Error, Result};
 pub struct SetupCheck {
     /// Most likely first.
     pub findings: Vec<SetupFinding>,
+    /// So many of the last findings have been taken out of the measurements already: they are told, and no verdict depends on them.
+    pub taken_out: usize,
     /// Weighted misfit per value that the first finding leaves; of the model as it stands where there is none.
     pub reduced_chi2: f64,
     /// Share of what stands above the noise that the first finding explains, 0..1.
@@ -40,9 +42,10 @@ impl SetupCheck {
         format!("the files were not looked at for mistakes of the setup: {error}")
     }
 
-    /// The finding that is believed, if one is.
+    /// The finding that is believed and still in the measurements, if one is.
     pub fn likely(&self) -> Option<&SetupFinding> {
-        self.findings.first().filter(|f| f.is_likely())
+        let left = self.findings.len().saturating_sub(self.taken_out);
+        self.findings[..left].first().filter(|f| f.is_likely())
     }
 }
 

@@ -1,4 +1,3 @@
-use super::common::straight_edge_only;
 use super::{CutPhysics, CutSetting, Cutting};
 use crate::data::Process;
 use crate::effects::background::ALTINTAS;
@@ -60,7 +59,6 @@ impl Effect<Cutting> for SizeEffect {
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         let flat = data.process != Process::Milling && data.feeds < 3;
         flat.then(|| "needs three feeds: with fewer it is other cutting and edge coefficients".to_string())
-            .or_else(|| straight_edge_only(data))
     }
 
     fn parameters(&self, at: At, Known { data, .. }: &Known<Cutting>) -> Vec<Parameter> {

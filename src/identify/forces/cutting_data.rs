@@ -16,7 +16,7 @@ use crate::identify::forces::asynchronous_lines::{
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
 use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
-use crate::signal::{MAINS_HZ, highest_order, line_amplitude, order_spectrum_above};
+use crate::signal::{MAINS_HZ, SpindleTrack, highest_order, line_amplitude, order_spectrum_above};
 use crate::{Error, InputError, Result};
 
 /// What was cut.
@@ -74,6 +74,8 @@ pub struct CutData {
     pub vibration: Option<AsynchronousLines>,
     /// What stands above the noise beside the orders (drilling and turning: orders and all).
     pub lines: Vec<StandingLine>,
+    /// The angle of a spindle that did not keep the stated speed, by which the record was put in step; `None` where it did.
+    pub spindle: Option<SpindleTrack>,
 }
 
 impl CutData {
@@ -221,6 +223,7 @@ impl CutData {
             steady: window.steady_blocks(),
             vibration,
             lines,
+            spindle: analysis.spindle.clone(),
         };
         data.narrow_contact();
         Ok(data)

@@ -220,9 +220,20 @@ fn chip_forces(
     let mut forces = Forces::zero(2 * cut.orders + 1, parameters);
     let is_linear = physics.size_exponent.is_none() && physics.runout.is_none();
     let own = physics.own_teeth.as_ref().filter(|_| parameters > 0);
-    if is_linear && physics.own_teeth.is_some() && milling.shape.is_none() && milling.has_one_helix() {
-        let teeth = milling.own_teeth(cut.orders, parameters > 0);
+    let differ = physics.own_teeth.is_some() || physics.runout.is_some();
+    let is_closed = match milling.shape {
+        None => is_linear,
+        Some(_) => physics.size_exponent.is_none(),
+    };
+    if differ && is_closed && milling.has_one_helix() {
+        let runout = physics.runout.as_ref();
+        let values = runout.map(|r| [r.offset_mm.value, r.angle_rad.value]);
+        let teeth = milling.own_teeth(cut.orders, values, parameters > 0);
         add_units(&mut forces, &teeth.unit, physics, dyno_from_tool);
+        let by_runout = runout.into_iter().flat_map(|r| [&r.offset_mm, &r.angle_rad]);
+        for (slope, by) in teeth.by_runout.iter().zip(by_runout) {
+            add_slopes(&mut forces, slope, [by; 3], physics, dyno_from_tool);
+        }
         for (index, by) in own.into_iter().flat_map(OwnTeeth::radii) {
             add_slopes(
                 &mut forces,

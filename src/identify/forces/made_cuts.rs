@@ -75,6 +75,7 @@ pub(crate) fn cut(
         steady: STEADY,
         vibration: None,
         lines: Vec::new(),
+        spindle: None,
     }
 }
 

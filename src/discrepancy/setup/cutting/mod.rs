@@ -20,6 +20,8 @@ use crate::Result;
 use crate::data::Process;
 use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
 use crate::identify::{CuttingData, CuttingModel};
+use crate::signal::SpindleTrack;
+use crate::text::listed;
 use direction::milling_direction;
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability};
 
@@ -28,11 +30,57 @@ const CUTS: usize = 4;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
 
-/// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels.
+/// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels. Last what was taken out
+/// while the records were read.
 ///
 /// # Errors
 /// Records that no model can be fitted to.
 pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<SetupCheck> {
+    let mut check = examine(data, rival)?;
+    let known = check.findings.iter().any(|f| f.kind == SPEED_VARIATION);
+    if let Some(finding) = speed_variation(data).filter(|_| !known) {
+        check.findings.push(finding);
+        check.taken_out = 1;
+    }
+    Ok(check)
+}
+
+const SPEED_VARIATION: &str = "spindle-speed-variation";
+
+/// A speed that wanders or droops, as the records were put in step for it.
+fn speed_variation(data: &CuttingData) -> Option<SetupFinding> {
+    let varying: Vec<(&str, &SpindleTrack)> = data
+        .cuts
+        .iter()
+        .filter_map(|cut| Some((cut.id.as_str(), cut.spindle.as_ref()?)))
+        .filter(|(_, track)| track.varies())
+        .collect();
+    let worst = varying
+        .iter()
+        .map(|(_, track)| *track)
+        .max_by(|a, b| a.varying_rad().total_cmp(&b.varying_rad()))?;
+    let (relative, std) = worst.variation();
+    let cuts: Vec<String> = varying.iter().map(|(id, _)| (*id).to_string()).collect();
+    let place = match varying.len() == data.cuts.len() {
+        true => "all cuts".to_string(),
+        false => format!("cut {}", listed(&cuts)),
+    };
+    Some(SetupFinding {
+        kind: SPEED_VARIATION,
+        place,
+        value: Some(worst.varying_rad()),
+        std_error: Some(worst.varying_rad() * std / relative),
+        unit: "rad",
+        confidence: 0.97,
+        remedy: format!(
+            "Look why the speed changes under load (it varies by {} %, rms): the tool is early or late by so much (rms). Averages and \
+             waveforms are put in step by the angle that the forces show, so that coefficients and verdict do not suffer from it.",
+            with_error(100.0 * relative, 100.0 * std)
+        ),
+    })
+}
+
+fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<SetupCheck> {
     let mut check = SetupCheck {
         reduced_chi2: 1.0,
         ..SetupCheck::default()
@@ -368,7 +416,7 @@ impl Change {
                     false => (1.0, "rad"),
                 };
                 SetupFinding {
-                    kind: "spindle-speed-variation",
+                    kind: SPEED_VARIATION,
                     place: "all cuts".into(),
                     value: Some(factor * value),
                     std_error: Some(factor * std),

@@ -1,4 +1,4 @@
-use crate::effects::cutting::common::{milling_only, straight_edge_only};
+use crate::effects::cutting::common::milling_only;
 use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, Runout};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
@@ -40,7 +40,6 @@ impl Effect<Cutting> for RunoutEffect {
 
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data)
-            .or_else(|| straight_edge_only(data))
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no runout against others".to_string()))
     }
 

@@ -1,4 +1,4 @@
-use crate::effects::cutting::common::{milling_only, one_helix_only, straight_edge_only};
+use crate::effects::cutting::common::{milling_only, one_helix_only};
 use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, OwnTeeth};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
@@ -61,14 +61,11 @@ impl Effect<Cutting> for ToothRadii {
     }
 
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
-        milling_only(data)
-            .or_else(|| straight_edge_only(data))
-            .or_else(|| one_helix_only(data))
-            .or_else(|| {
-                (data.teeth < 3).then(|| {
-                    "of two teeth a short one is what runout looks like, too (runout is tried)".to_string()
-                })
+        milling_only(data).or_else(|| one_helix_only(data)).or_else(|| {
+            (data.teeth < 3).then(|| {
+                "of two teeth a short one is what runout looks like, too (runout is tried)".to_string()
             })
+        })
     }
 
     fn choice_obstacle(&self, variant: usize, Known { data, .. }: &Known<Cutting>) -> Option<String> {

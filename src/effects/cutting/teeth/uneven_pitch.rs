@@ -1,4 +1,4 @@
-use crate::effects::cutting::common::{milling_only, one_helix_only, straight_edge_only};
+use crate::effects::cutting::common::{milling_only, one_helix_only};
 use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, CuttingSummary, OwnTeeth};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
@@ -56,7 +56,6 @@ impl Effect<Cutting> for UnevenPitch {
 
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data)
-            .or_else(|| straight_edge_only(data))
             .or_else(|| one_helix_only(data))
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no pitch to others".to_string()))
             .or_else(|| {

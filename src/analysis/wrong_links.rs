@@ -9,7 +9,7 @@ use crate::campaign::{Campaign, LinkGroup};
 use crate::discrepancy::candidate::share_taken;
 use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{Diagnosis, EffectCandidate};
-use crate::effects::Structure;
+use crate::effects::{LINK_FLEXIBILITY, Structure};
 use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
 use crate::identify::study::{Extent, Study, View};
 use crate::identify::{Calibration, Estimate, StructureCase, StructureModel, StructureStudy};
@@ -23,6 +23,8 @@ pub struct WrongLinks {
     pub reduced_chi2: f64,
     /// Share of what stands above the noise that they explain, 0..1.
     pub explained_share: f64,
+    /// The effect that the model has besides; `None` where it stands as it is.
+    pub beside: Option<String>,
 }
 
 /// Share of what stands above the noise in a glance at the data that all numbers together must explain to be followed.
@@ -40,8 +42,8 @@ const SETTLE: Stopping = Stopping {
 };
 
 impl WrongLinks {
-    /// Sought from where the diagnosis left the model as it stands; `None` where such numbers do not explain what is left, or no
-    /// better than an effect.
+    /// Sought from where the diagnosis left the model as it stands, and where the links bend that the robot file has as rigid, from
+    /// where that left them; `None` where such numbers do not explain what is left, or no better than an effect.
     ///
     /// # Errors
     /// A model that cannot be set up, and a fit that fails.
@@ -51,13 +53,53 @@ impl WrongLinks {
         study: &StructureStudy,
         diagnosis: &Diagnosis<Structure>,
     ) -> Result<Option<Self>> {
-        let groups: Vec<LinkGroup> = LinkGroup::of_model(case.bends());
+        let standing = Standing {
+            model: &case.model,
+            fit: &diagnosis.baseline.calibration,
+            with: None,
+        };
+        if let Some(found) = Self::beside(campaign, case, study, diagnosis, standing)? {
+            return Ok(Some(found));
+        }
+        let Some(bending) = diagnosis.best_guess.map(|i| &diagnosis.candidates[i]) else {
+            return Ok(None);
+        };
+        if bending.name.effect != LINK_FLEXIBILITY || !bending.refined {
+            return Ok(None);
+        }
+        let problem = study.problem(&bending.model, View::FULL);
+        let fit = minimise(&problem, &bending.theta, &bending.model.bounds(), SETTLE)?;
+        let fit = Calibration::of_fit(&bending.model.parameters, fit, study.real_values(Extent::Full))?;
+        let standing = Standing {
+            model: &bending.model,
+            fit: &fit,
+            with: Some(bending),
+        };
+        Self::beside(campaign, case, study, diagnosis, standing)
+    }
+
+    fn beside(
+        campaign: &Campaign,
+        case: &StructureCase,
+        study: &StructureStudy,
+        diagnosis: &Diagnosis<Structure>,
+        standing: Standing<'_>,
+    ) -> Result<Option<Self>> {
+        let Standing {
+            model: as_it_stands,
+            fit: before,
+            with: effect,
+        } = standing;
+        let groups: Vec<LinkGroup> = LinkGroup::of_model(as_it_stands.has(LINK_FLEXIBILITY));
         let free = |only: Option<&[String]>| -> Result<StructureModel> {
             let groups = &groups;
-            Ok(case.freeing(campaign, &Freed { groups, only })?.model)
+            let freed = case.freeing(campaign, &Freed { groups, only })?.model;
+            Ok(match effect {
+                Some(effect) => study.extend(&freed, &effect.instance),
+                None => freed,
+            })
         };
         let every = free(None)?;
-        let before = &diagnosis.baseline.calibration;
         if every.parameters.len() == before.parameters.len() {
             return Ok(None);
         }
@@ -65,7 +107,7 @@ impl WrongLinks {
             minimise(&study.problem(model, view), start, &model.bounds(), stopping)
         };
         let start = by_name(&every.parameters, &before.parameters);
-        let above_noise = study.problem(&case.model, View::GLANCE).cost(&before.theta)?
+        let above_noise = study.problem(as_it_stands, View::GLANCE).cost(&before.theta)?
             - 0.5 * study.real_values(Extent::Glance) as f64;
         // What one step of Gauss and Newton promises is soon known, and mostly enough.
         let here = study.problem(&every, View::GLANCE).linearise(&start)?;
@@ -76,7 +118,7 @@ impl WrongLinks {
             return Ok(None);
         }
         let with = fit(&every, View::GLANCE, &start, LOOK)?;
-        let without = fit(&case.model, View::GLANCE, &before.theta, LOOK)?;
+        let without = fit(as_it_stands, View::GLANCE, &before.theta, LOOK)?;
         if without.cost - with.cost < PROMISING * above_noise {
             return Ok(None);
         }
@@ -114,6 +156,16 @@ impl WrongLinks {
                 .collect(),
             reduced_chi2: after.reduced_chi2,
             explained_share: share_taken(base, after.reduced_chi2).clamp(0.0, 1.0),
+            beside: effect.map(EffectCandidate::label),
         }))
     }
+}
+
+/// The model from which other links are sought, and its fit.
+#[derive(Clone, Copy)]
+struct Standing<'a> {
+    model: &'a StructureModel,
+    fit: &'a Calibration,
+    /// What the model has beyond the case's.
+    with: Option<&'a EffectCandidate<Structure>>,
 }

@@ -181,11 +181,15 @@ impl<'a> Guide<'a> {
     }
 
     /// After `diagnose`, where numbers of the robot file explain what no effect does.
-    pub fn wrong_links(&self) -> String {
-        format!(
-            "run `lobestone calibrate {} --free links` for the links that fit, and compare them with what the robot is",
-            shell_word(&self.campaign.dir)
-        )
+    pub fn wrong_links(&self, beside: Option<&str>) -> String {
+        let dir = shell_word(&self.campaign.dir);
+        let run = match beside {
+            Some(effect) => {
+                format!("`lobestone add {dir} {effect}`, then `lobestone calibrate {dir} --free links`")
+            }
+            None => format!("`lobestone calibrate {dir} --free links`"),
+        };
+        format!("run {run} for the links that fit, and compare them with what the robot is")
     }
 
     /// After `add`.

@@ -398,6 +398,13 @@ impl SpindleTrack {
         smear_rad(&own, self.turns)
     }
 
+    /// Share of a line at `order` that its average over the turns loses at most where the track does not follow: a phase that scatters by
+    /// σ leaves 1 − σ²/2, and it scatters in proportion to the order.
+    pub fn lost_of_line(&self, order: usize) -> f64 {
+        let ratio = order as f64 / self.order as f64;
+        (0.5 * ratio * ratio * (1.0 - self.in_step[1]).max(0.0)).min(1.0)
+    }
+
     /// Root mean square of the speed's changes over the stated speed, and its standard error.
     pub fn variation(&self) -> (f64, f64) {
         // A straight line from −d/2 to d/2 has d/√12.

@@ -378,7 +378,19 @@ mod tests {
         });
         let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
         let found = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
-        assert!(worst(&found) < 0.01, "{}", worst(&found));
+        for (own, truth) in found.pooled[0].coefficients.iter().zip(TRUTH) {
+            let (value, std) = (own.value.unwrap(), own.std_error.unwrap());
+            assert!(
+                (value - truth).abs() < 4.0 * std,
+                "{}: {value} ± {std}",
+                own.label
+            );
+            assert!(
+                (value / truth - 1.0).abs() < 0.06,
+                "{}: {value} ± {std}",
+                own.label
+            );
+        }
         for cut in &found.cuts {
             let track = cut.spindle.as_ref().unwrap();
             assert!(

@@ -74,7 +74,7 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         + &crate::commands::find::compare::dominant(peaks)
         + &where_it_shows(findings);
     let guide = Guide::structure(campaign);
-    let instead = wrong_links(findings).map(|_| guide.wrong_links());
+    let instead = wrong_links(findings).map(|found| guide.wrong_links(found.beside.as_deref()));
     outcome(guide, findings, own, &told, instead)
 }
 
@@ -499,9 +499,16 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
 }
 
 fn wrong_links_in_words(found: &WrongLinks) -> String {
+    let (beside, first) = match &found.beside {
+        Some(effect) => (
+            format!("{effect} and "),
+            format!("after `lobestone add` of {effect}, "),
+        ),
+        None => (String::new(), String::new()),
+    };
     format!(
-        "The robot file may be wrong: with {} the model leaves {:.2} times the noise variance. Compare these numbers with a drawing or \
-         the maker's data; `lobestone calibrate --free links` fits them.",
+        "The robot file may be wrong: with {beside}{} the model leaves {:.2} times the noise variance. Compare these numbers with a \
+         drawing or the maker's data; {first}`lobestone calibrate --free links` fits them.",
         found
             .departing
             .iter()

@@ -129,7 +129,13 @@ impl CutData {
             let zero = |k: usize| channel.drift.at(record.start_s + k as f64 / rate);
             let first = window.steady.start;
             let steady = &values[window.steady.clone()];
-            let spectrum = order_spectrum_above(steady, |k| zero(first + k), rate, per_turn, orders)?;
+            let mut spectrum = order_spectrum_above(steady, |k| zero(first + k), rate, per_turn, orders)?;
+            if let Some(track) = &analysis.spindle {
+                let lines = spectrum.coefficient.iter().zip(&mut spectrum.std);
+                for (order, (line, std)) in (1..).zip(lines) {
+                    *std = std.hypot(track.lost_of_line(order) * line.norm());
+                }
+            }
             let air_std = window
                 .air()
                 .map(|r| sample_std(&values[r]))

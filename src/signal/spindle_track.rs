@@ -53,6 +53,8 @@ const MOST_COSINES: usize = 24;
 const LEAST_IN_STEP: f64 = 0.8;
 /// Speeds further off than this show in the spectrum as a wrong speed or a wrong number of teeth, and nothing is removed.
 const FURTHEST: f64 = 0.03;
+/// Share of a line that putting in step may leave wrong, as made records show.
+const WITHIN_A_TURN: f64 = 1e-3;
 /// Turns of the line from one turn of the tool to the next, above what is stated, up to which the count is sure.
 const SURE_STEP: f64 = 0.4;
 /// Smear of the followed line, rad of its own phase (rms), from which on it is reported: at 0.15 the line's average loses 1 %.
@@ -398,11 +400,15 @@ impl SpindleTrack {
         smear_rad(&own, self.turns)
     }
 
-    /// Share of a line at `order` that its average over the turns loses at most where the track does not follow: a phase that scatters by
-    /// σ leaves 1 − σ²/2, and it scatters in proportion to the order.
+    /// Share of a line at `order` by which its average over the turns may be wrong. Where the track does not follow, a phase that
+    /// scatters by σ leaves 1 − σ²/2, and it scatters in proportion to the order; between two samples the interpolation takes
+    /// 1 − (9 cos ω/2 − cos 3ω/2) / 8, ω rad a sample; and some is left of what is quicker than a turn.
     pub fn lost_of_line(&self, order: usize) -> f64 {
         let ratio = order as f64 / self.order as f64;
-        (0.5 * ratio * ratio * (1.0 - self.in_step[1]).max(0.0)).min(1.0)
+        let unfollowed = 0.5 * ratio * ratio * (1.0 - self.in_step[1]).max(0.0);
+        let half = 0.5 * TAU * order as f64 / self.samples_per_turn;
+        let between = 1.0 - (9.0 * half.cos() - (3.0 * half).cos()) / 8.0;
+        (unfollowed + between + WITHIN_A_TURN).min(1.0)
     }
 
     /// Root mean square of the speed's changes over the stated speed, and its standard error.
@@ -446,13 +452,19 @@ impl SpindleTrack {
         self.resampled(values, 0..values.len())
     }
 
-    /// Samples `range` of that: cubic interpolation between samples (Keys 1981), ends repeated.
+    /// Samples `range` of that: cubic interpolation between samples (Keys 1981).
     fn resampled<S: Sample>(&self, values: &[S], range: Range<usize>) -> Vec<S> {
         let last = values.len().saturating_sub(1) as isize;
-        let value = |i: isize| values.get(i.clamp(0, last) as usize).map_or(0.0, |v| v.value());
+        let from = self.from as f64;
+        let window = from..from + self.turns as f64 * self.samples_per_turn;
+        // Beyond the record it goes backwards: one value throughout would be no air.
+        let within = |i: isize| i.abs().min(2 * last - i).clamp(0, last) as usize;
+        let value = |i: isize| values.get(within(i)).map_or(0.0, |v| v.value());
         range
             .map(|i| {
                 let at = self.sample_in_step(i as f64);
+                // Beyond what was followed samples move whole: between two of them noise is less, and air would not be air any more.
+                let at = if window.contains(&at) { at } else { at.round() };
                 let low = at.floor();
                 let (t, i) = (at - low, low as isize);
                 let [a, b, c, d] = [value(i - 1), value(i), value(i + 1), value(i + 2)];

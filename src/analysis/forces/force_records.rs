@@ -192,7 +192,7 @@ pub fn identify_forces(campaign: &Workbench, options: CfcOptions) -> Result<CfcR
 mod tests {
     use super::*;
     use crate::analysis::forces::made_force_records::{
-        CUT_S, MadeCut, TRUTH, write_campaign, write_campaign_of,
+        CUT_S, MadeCut, MadeTool, TRUTH, write_campaign, write_campaign_of,
     };
     use crate::cutting::{OTHER_SPEED, WRONG_SPEED, analyse_cut};
     use crate::data::Process;
@@ -420,6 +420,48 @@ mod tests {
         }
     }
 
+    const BALL: MadeTool = MadeTool {
+        corner_radius_mm: 5.0,
+        runout_mm: 0.0,
+        exponents: [0.0; 3],
+    };
+
+    /// A ball end that runs out, a law of the chip with an exponent for each direction, and nothing of the kind: named with their sizes,
+    /// and the coefficients are those of the metal.
+    #[test]
+    fn what_a_ball_end_and_its_metal_do_is_named() {
+        let out = MadeTool {
+            runout_mm: 0.012,
+            ..BALL
+        };
+        let kienzle = MadeTool {
+            exponents: [0.26, 0.4, 0.32],
+            ..BALL
+        };
+        for (tool, named, sizes) in [
+            (BALL, None, vec![]),
+            (out, Some("runout"), vec![0.012]),
+            (kienzle, Some("size-effect"), kienzle.exponents.to_vec()),
+        ] {
+            let dir = tempfile::tempdir().unwrap();
+            let cuts = [0.03, 0.06, 0.1, 0.16].map(|feed_mm| MadeCut {
+                rpm: 1500.0,
+                feed_mm,
+                speed: &|_| 1.0,
+            });
+            let campaign = write_campaign_of(dir.path(), tool, &cuts, &|_, _, _, _, _| 0.0);
+            let found = crate::analysis::CuttingFindings::run(&campaign, crate::identify::Options::default())
+                .unwrap();
+            let winner = found.diagnosis.winner();
+            let name = winner.map(|w| w.name.effect.as_str());
+            assert_eq!(name, named, "{:?}", found.diagnosis.confidence);
+            for (parameter, truth) in winner.iter().flat_map(|w| &w.parameters).zip(&sizes) {
+                let off = (parameter.value - truth).abs();
+                assert!(off < 0.05 * truth, "{parameter:?} for {truth}");
+            }
+        }
+    }
+
     /// Slots with a ball end: the radial force has an axial part, so that all six coefficients depend on each other.
     #[test]
     fn a_ball_end_gives_back_its_coefficients() {
@@ -429,7 +471,7 @@ mod tests {
             feed_mm,
             speed: &|_| 1.0,
         });
-        let campaign = write_campaign_of(dir.path(), 5.0, &cuts, &|_, _, _, _, _| 0.0);
+        let campaign = write_campaign_of(dir.path(), BALL, &cuts, &|_, _, _, _, _| 0.0);
         let result = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
         let found = &result.pooled[0];
         for (coefficient, truth) in found.coefficients.iter().zip(TRUTH) {
@@ -440,7 +482,7 @@ mod tests {
         assert!(found.r2.iter().flatten().all(|r2| *r2 > 0.999));
         assert!(result.warnings.is_empty(), "{:?}", result.warnings);
         // Taken for a straight end mill the radial force comes out a third too small.
-        let straight = write_campaign_of(dir.path(), 0.0, &[], &|_, _, _, _, _| 0.0);
+        let straight = write_campaign_of(dir.path(), MadeTool::default(), &[], &|_, _, _, _, _| 0.0);
         let wrong = Campaign {
             tool: straight.tool,
             ..campaign

@@ -26,6 +26,17 @@ pub struct MadeCut<'a> {
     pub speed: &'a dyn Fn(f64) -> f64,
 }
 
+/// What the tool is like.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MadeTool {
+    /// 0, or a radius that is no less than the depth.
+    pub corner_radius_mm: f64,
+    /// Offset of its axis from the spindle's, towards tooth 0.
+    pub runout_mm: f64,
+    /// Kienzle's exponents of the tangential, radial and axial force, from 0.1 mm.
+    pub exponents: [f64; 3],
+}
+
 /// Ends of the edge's bits as distance from the axis and height, mm: up the side of the tool, or round its corner.
 fn outline(corner_radius_mm: f64) -> Vec<[f64; 2]> {
     let bits = 40;
@@ -46,8 +57,8 @@ fn outline(corner_radius_mm: f64) -> Vec<[f64; 2]> {
 }
 
 /// Forces on the tool by its angle, in [`POINTS`] steps of a turn: vectors in space, bit by bit of the edge.
-fn turn(feed_mm: f64, corner_radius_mm: f64) -> Vec<[f64; 3]> {
-    let outline = outline(corner_radius_mm);
+fn turn(feed_mm: f64, tool: MadeTool) -> Vec<[f64; 3]> {
+    let outline = outline(tool.corner_radius_mm);
     let lag = 2.0 * HELIX_DEG.to_radians().tan() / DIAMETER_MM;
     let at = |angle: f64| {
         let mut sum = [0.0; 3];
@@ -61,8 +72,21 @@ fn turn(feed_mm: f64, corner_radius_mm: f64) -> Vec<[f64; 3]> {
                 let (out, up) = (ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]);
                 let length = out.hypot(up);
                 let (sin, cos) = phi.sin_cos();
-                let chip = feed_mm * sin * up / length;
-                let [t, r, a] = [0, 1, 2].map(|i| (TRUTH[i] * chip + TRUTH[i + 3]) * length);
+                // Tooth m before stood farther out here, or nearer; what is left is the least that any of a turn left.
+                let out_by = |m: usize| {
+                    let from_offset = lag * z - TAU * (tooth + m) as f64 / TEETH as f64;
+                    tool.runout_mm * from_offset.cos()
+                };
+                let left = |m: usize| m as f64 * feed_mm * sin + out_by(0) - out_by(m);
+                let radial = (1..=TEETH).map(left).fold(f64::INFINITY, f64::min);
+                if radial <= 0.0 {
+                    continue;
+                }
+                let chip = radial * up / length;
+                let [t, r, a] = [0, 1, 2].map(|i| {
+                    let size = (chip / 0.1).powf(-tool.exponents[i]);
+                    (TRUTH[i] * chip * size + TRUTH[i + 3]) * length
+                });
                 // Away from the axis across the edge, and along it.
                 let outward = (a * out - r * up) / length;
                 sum[0] += -t * cos + outward * sin;
@@ -81,19 +105,20 @@ pub fn write_campaign(
     cuts: &[MadeCut],
     more: &dyn Fn(usize, usize, f64, f64, bool) -> f64,
 ) -> crate::campaign::Campaign {
-    write_campaign_of(dir, 0.0, cuts, more)
+    write_campaign_of(dir, MadeTool::default(), cuts, more)
 }
 
-/// As [`write_campaign`], with a tool whose corner is round: 0, or a radius that is no less than the depth.
+/// As [`write_campaign`], with another tool.
 pub fn write_campaign_of(
     dir: &Path,
-    corner_radius_mm: f64,
+    tool: MadeTool,
     cuts: &[MadeCut],
     more: &dyn Fn(usize, usize, f64, f64, bool) -> f64,
 ) -> crate::campaign::Campaign {
     let mut toml = format!(
         "schema = \"lobestone/campaign/1\"\nname = \"made\"\n\n[tool]\nkind = \"endmill\"\ndiameter_mm = {DIAMETER_MM:?}\nteeth = {TEETH}\n\
-         helix_deg = {HELIX_DEG:?}\ncorner_radius_mm = {corner_radius_mm:?}\n\n[material]\nname = \"unnamed\"\n"
+         helix_deg = {HELIX_DEG:?}\ncorner_radius_mm = {:?}\n\n[material]\nname = \"unnamed\"\n",
+        tool.corner_radius_mm
     );
     std::fs::create_dir_all(dir.join("force")).unwrap();
     for (c, cut) in cuts.iter().enumerate() {
@@ -104,7 +129,7 @@ pub fn write_campaign_of(
              {:?}\naxial_depth_mm = {DEPTH_MM:?}\nimmersion = \"slot\"\n",
             cut.rpm, cut.feed_mm
         );
-        let turn = turn(cut.feed_mm, corner_radius_mm);
+        let turn = turn(cut.feed_mm, tool);
         let mut random = ChaCha8Rng::seed_from_u64(c as u64 + 7);
         let mut text = String::from("Time [s],Fx [N],Fy [N],Fz [N]\n");
         let mut angle = 0.3 + c as f64;

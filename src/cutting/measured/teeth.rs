@@ -360,7 +360,7 @@ fn direction(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cutting::waveform::ToothPlace;
+    use crate::cutting::waveform::{TeethSlopes, ToothPlace};
     use crate::data::Immersion;
 
     fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
@@ -399,7 +399,7 @@ mod tests {
             // An offset of the axis besides is no fault of the list.
             ([0.01, -2.0, -0.01, 0.0], one, false),
         ] {
-            let unit = with(truth).own_teeth(8, None, false).unit;
+            let unit = with(truth).own_teeth(8, None, TeethSlopes::None).unit;
             // A tool that stands 50° on, 1900 and 700 N/mm² and edges of 20 and 25 N/mm.
             let of = |axis: usize| -> Vec<Complex64> {
                 let sum = |k: usize| {
@@ -545,7 +545,7 @@ mod tests {
             places: radii.iter().enumerate().map(place).collect(),
             ..cut.clone()
         };
-        let unit = own.own_teeth(teeth, None, false).unit;
+        let unit = own.own_teeth(teeth, None, TeethSlopes::None).unit;
         let coefficient = [900.0, 350.0, 0.0, 15.0, 18.0, 0.0];
         let order = |axis: usize, k: usize| -> Complex64 {
             let force: Complex64 = (0..6).map(|c| unit[c][axis][k] * coefficient[c]).sum();

@@ -11,7 +11,7 @@ use num_complex::Complex64;
 
 use super::edge_shape::EdgeShape;
 use super::quadrature::gauss_legendre;
-use super::tooth_place::ToothPlace;
+use super::tooth_place::{TeethSlopes, ToothPlace};
 use crate::data::{CutGeometry, Immersion, Tool};
 
 /// Ktc Krc Kac Kte Kre Kae.
@@ -105,7 +105,9 @@ impl MillingCut {
     pub fn linear(&self, orders: usize) -> UnitForces {
         match self.places.is_empty() {
             true => self.closed_form(orders),
-            false if self.shape.is_some() && self.has_one_helix() => self.own_teeth(orders, None, false).unit,
+            false if self.shape.is_some() && self.has_one_helix() => {
+                self.own_teeth(orders, None, TeethSlopes::None).unit
+            }
             false => self.sampled(orders, ChipLaw::default(), false).unit,
         }
     }
@@ -1003,7 +1005,7 @@ mod tests {
             }
             let unit = match (exponent, runout) {
                 (None, None) => cut.closed_form(orders),
-                (None, runout) => cut.own_teeth(orders, runout, false).unit,
+                (None, runout) => cut.own_teeth(orders, runout, TeethSlopes::None).unit,
                 _ => cut.sampled(orders, law, false).unit,
             };
             if exponent.is_none() {

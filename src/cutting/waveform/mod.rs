@@ -17,5 +17,5 @@ pub use edge_shape::EdgeShape;
 pub use milling::{ChipLaw, MillingCut, SampledForces, UNIT_COUNT, UnitForces};
 pub use own_teeth::OwnTeethForces;
 pub(super) use quadrature::gauss_legendre;
-pub use tooth_place::ToothPlace;
+pub use tooth_place::{TeethSlopes, ToothPlace};
 pub use vibrating::{LineForces, VibratingForces};

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 
 use super::milling::{EdgePart, ImmersionWindow, MillingCut, Turns, UnitForces, put};
-use super::tooth_place::ToothPlace;
+use super::tooth_place::{TeethSlopes, ToothPlace};
 use crate::data::Immersion;
 
 /// Forces with their derivatives by what belongs to each tooth.
@@ -65,21 +65,22 @@ impl MillingCut {
 
     /// Forces of the teeth as [`Self::places`] has them (one helix), linear in the chip thickness. `runout`: offset of the tool's axis,
     /// mm, and its direction from tooth 0, rad; on a straight edge, where it changes along the edge, [`Self::sampled`] has it.
-    pub fn own_teeth(&self, orders: usize, runout: Option<[f64; 2]>, derivatives: bool) -> OwnTeethForces {
+    pub fn own_teeth(&self, orders: usize, runout: Option<[f64; 2]>, wanted: TeethSlopes) -> OwnTeethForces {
         let places = self.places_or_even();
-        let slopes = |count: usize| -> Vec<UnitForces> {
-            let count = if derivatives { count } else { 0 };
+        let slopes = |count: usize, wanted: bool| -> Vec<UnitForces> {
+            let count = if wanted { count } else { 0 };
             (0..count).map(|_| Self::nothing(orders)).collect()
         };
+        let of_teeth = wanted == TeethSlopes::All;
         let mut all = OwnTeethForces {
             unit: Self::nothing(orders),
-            by_radius: slopes(places.len()),
-            by_angle: slopes(places.len()),
-            by_runout: slopes(if runout.is_some() { 2 } else { 0 }),
+            by_radius: slopes(places.len(), of_teeth),
+            by_angle: slopes(places.len(), of_teeth),
+            by_runout: slopes(2, runout.is_some() && wanted != TeethSlopes::None),
         };
         for part in self.edge_parts(orders, 1) {
             let Some([offset_mm, angle_rad]) = runout else {
-                self.add_teeth(&mut all, &part, &places, None, derivatives);
+                self.add_teeth(&mut all, &part, &places, None);
                 continue;
             };
             let from_offset = |place: &ToothPlace| angle_rad - place.ahead_rad + self.lag_rad * part.height;
@@ -94,7 +95,7 @@ impl MillingCut {
                     [cos, -offset_mm * sin]
                 })
                 .collect();
-            self.add_teeth(&mut all, &part, &eccentric, Some(&by_runout), derivatives);
+            self.add_teeth(&mut all, &part, &eccentric, Some(&by_runout));
         }
         all
     }
@@ -106,7 +107,6 @@ impl MillingCut {
         part: &EdgePart,
         places: &[ToothPlace],
         by_runout: Option<&[[f64; 2]]>,
-        derivatives: bool,
     ) {
         let teeth = places.len();
         let orders = part.factors.len() - 1;
@@ -116,20 +116,8 @@ impl MillingCut {
             let (cutting, edge) = (cutting.map(|v| v * depth), edge.map(|v| v * length));
             put(unit, n, &cutting, &edge, part.kappa);
         };
-        // The radius of a tooth, which runout changes, too.
-        let add_radius = |all: &mut OwnTeethForces, j: usize, n: usize, values: [[Complex64; 3]; 2]| {
-            let [cutting, edge] = values;
-            add(&mut all.by_radius[j], n, cutting, edge);
-            for (i, weight) in by_runout.iter().flat_map(|by| by[j].iter().enumerate()) {
-                let weighted = |set: [Complex64; 3]| set.map(|v| v * weight);
-                add(&mut all.by_runout[i], n, weighted(cutting), weighted(edge));
-                // A tooth further ahead stands elsewhere against the offset.
-                if i == 1 {
-                    let minus = |set: [Complex64; 3]| set.map(|v| v * -weight);
-                    add(&mut all.by_angle[j], n, minus(cutting), minus(edge));
-                }
-            }
-        };
+        let times = |set: [Complex64; 3], factor: f64| set.map(|v| v * factor);
+        let of_teeth = !all.by_radius.is_empty();
         for (j, place) in places.iter().enumerate() {
             let ahead = Turns::new(-place.ahead_rad, orders);
             for stretch in self.stretches(part.immersion, places, j) {
@@ -145,7 +133,7 @@ impl MillingCut {
                     });
                     let edge = integral.plain.map(|v| turn * v);
                     add(&mut all.unit, n, cutting, edge);
-                    if !derivatives {
+                    if !of_teeth && all.by_runout.is_empty() {
                         continue;
                     }
                     // Where the chip begins or ends from nothing the stretch grows with the chip: only the edge notices.
@@ -169,11 +157,31 @@ impl MillingCut {
                     let by_slope = integral.by_sine.map(|v| turn * v * feed_per_rad);
                     let edge_by_slope = grows[1].map(|v| v * feed_per_rad);
                     if before != j {
-                        add_radius(all, j, n, [by_offset, grows[0]]);
-                        add(&mut all.by_angle[before], n, by_slope, edge_by_slope);
-                        let minus = |set: [Complex64; 3]| set.map(|v| -v);
-                        add_radius(all, before, n, [minus(by_offset), minus(grows[0])]);
-                        add(&mut all.by_angle[j], n, minus(by_slope), minus(edge_by_slope));
+                        for (i, unit) in all.by_runout.iter_mut().enumerate() {
+                            let weight = by_runout.map_or(0.0, |by| by[j][i] - by[before][i]);
+                            add(unit, n, times(by_offset, weight), times(grows[0], weight));
+                        }
+                    }
+                    if !of_teeth {
+                        continue;
+                    }
+                    for (tooth, sign) in [(j, 1.0), (before, -1.0)].into_iter().filter(|_| before != j) {
+                        let (cutting, edge) = (times(by_offset, sign), times(grows[0], sign));
+                        add(&mut all.by_radius[tooth], n, cutting, edge);
+                        // Further ahead it stands elsewhere against the offset, and leaves more for the one that follows.
+                        let turned = by_runout.map_or(0.0, |by| -by[tooth][1]);
+                        add(
+                            &mut all.by_angle[tooth],
+                            n,
+                            times(cutting, turned),
+                            times(edge, turned),
+                        );
+                        add(
+                            &mut all.by_angle[tooth],
+                            n,
+                            times(by_slope, -sign),
+                            times(edge_by_slope, -sign),
+                        );
                     }
                     let turning = Complex64::new(0.0, n as f64);
                     let moved = |set: [Complex64; 3]| set.map(|v| v * turning);
@@ -334,7 +342,7 @@ mod tests {
                     }
                 }
             }
-            let off = worst(&sum, &cut.own_teeth(orders, None, false).unit);
+            let off = worst(&sum, &cut.own_teeth(orders, None, TeethSlopes::None).unit);
             assert!(off < 2e-4, "{:?}: {off}", cut.places);
         }
     }
@@ -344,14 +352,14 @@ mod tests {
     fn closed_form_equals_quadrature_and_alike_teeth() {
         for cut in cases() {
             let sampled = cut.sampled(24, ChipLaw::default(), false).unit;
-            let off = worst(&sampled, &cut.own_teeth(24, None, false).unit);
+            let off = worst(&sampled, &cut.own_teeth(24, None, TeethSlopes::None).unit);
             assert!(off < 3e-3, "{:?}: {off}", cut.places);
         }
         let mut alike = cut([0.0, 180.0], &[90.0; 4], &[0.0; 4]);
-        let own = alike.own_teeth(24, None, false).unit;
+        let own = alike.own_teeth(24, None, TeethSlopes::None).unit;
         alike.places.clear();
         assert!(worst(&alike.closed_form(24), &own) < 1e-12);
-        assert!(worst(&alike.own_teeth(24, None, false).unit, &own) < 1e-12);
+        assert!(worst(&alike.own_teeth(24, None, TeethSlopes::None).unit, &own) < 1e-12);
     }
 
     /// Teeth of one radius come into a slot with chips of no thickness: there a longer tooth changes what a shorter one does not, and no
@@ -392,12 +400,12 @@ mod tests {
                 &[0.0, -0.02, 0.004, 0.011],
             )
         };
-        let own = bull.own_teeth(12, Some([0.01, 0.7]), true);
+        let own = bull.own_teeth(12, Some([0.01, 0.7]), TeethSlopes::All);
         for (i, step) in [(0, 1e-7), (1, 1e-6)] {
             let moved = |sign: f64| {
                 let mut runout = [0.01, 0.7];
                 runout[i] += sign * step;
-                bull.own_teeth(12, Some(runout), false).unit
+                bull.own_teeth(12, Some(runout), TeethSlopes::None).unit
             };
             let off = relative(&by_difference(moved(1.0), &moved(-1.0), step), &own.by_runout[i]);
             assert!(off < 1e-3, "{i}: {off}");
@@ -406,7 +414,7 @@ mod tests {
             let moved = |step: f64| {
                 let mut other = bull.clone();
                 other.places[j].ahead_rad += step;
-                other.own_teeth(12, Some([0.01, 0.7]), false).unit
+                other.own_teeth(12, Some([0.01, 0.7]), TeethSlopes::None).unit
             };
             let off = relative(&by_difference(moved(1e-6), &moved(-1e-6), 1e-6), &own.by_angle[j]);
             assert!(off < 1e-3, "tooth {j}: {off}");
@@ -418,7 +426,7 @@ mod tests {
         let smooth: Vec<MillingCut> = cases().into_iter().filter(has_derivatives).collect();
         assert_eq!(smooth.len(), 4);
         for cut in smooth {
-            let own = cut.own_teeth(24, None, true);
+            let own = cut.own_teeth(24, None, TeethSlopes::All);
             for j in 0..cut.teeth {
                 // A missing tooth's radius changes nothing, a tooth on the verge of missing is not among the cases.
                 for (analytic, change) in [
@@ -431,7 +439,7 @@ mod tests {
                     let moved = |step: f64| {
                         let mut other = cut.clone();
                         change(&mut other.places[j], step);
-                        other.own_teeth(24, None, false).unit
+                        other.own_teeth(24, None, TeethSlopes::None).unit
                     };
                     let off = relative(&by_difference(moved(1e-6), &moved(-1e-6), 1e-6), analytic);
                     assert!(off < 1e-4, "tooth {j} of {:?}: {off}", cut.places);

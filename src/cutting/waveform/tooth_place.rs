@@ -15,6 +15,17 @@ pub struct ToothPlace {
     pub radius_mm: f64,
 }
 
+/// Which derivatives of the forces of teeth that differ are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TeethSlopes {
+    /// None at all.
+    None,
+    /// By the offset of the tool's axis and its direction.
+    OfRunout,
+    /// Those, and by radius and angle of each tooth.
+    All,
+}
+
 impl ToothPlace {
     /// The teeth of a tool over a depth; empty where they are alike.
     pub(super) fn all(tool: &Tool, axial_depth_mm: f64) -> Vec<ToothPlace> {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use num_complex::Complex64;
 
 use crate::cutting::waveform::{
-    ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, ToothPlace, UnitForces,
+    ChipLaw, DrillTerm, DrillingCut, LineForces, MillingCut, TeethSlopes, ToothPlace, UnitForces,
 };
 use crate::cutting::{EdgeBit, ForceAxis};
 use crate::effects::cutting::{CutPhysics, Mixing, OwnTeeth};
@@ -228,7 +228,12 @@ fn chip_forces(
     if differ && is_closed && milling.has_one_helix() {
         let runout = physics.runout.as_ref();
         let values = runout.map(|r| [r.offset_mm.value, r.angle_rad.value]);
-        let teeth = milling.own_teeth(cut.orders, values, parameters > 0);
+        let wanted = match (parameters, own) {
+            (0, _) => TeethSlopes::None,
+            (_, None) => TeethSlopes::OfRunout,
+            (_, Some(_)) => TeethSlopes::All,
+        };
+        let teeth = milling.own_teeth(cut.orders, values, wanted);
         add_units(&mut forces, &teeth.unit, physics, dyno_from_tool);
         let by_runout = runout.into_iter().flat_map(|r| [&r.offset_mm, &r.angle_rad]);
         for (slope, by) in teeth.by_runout.iter().zip(by_runout) {

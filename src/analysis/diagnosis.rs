@@ -5,6 +5,7 @@ use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{Rival, SetupCheck};
+use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{
     Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, diagnose, diagnose_from,
 };
@@ -50,6 +51,7 @@ pub struct Leading<D: CampaignSide> {
 fn is_unnamed<D: Modelled>(diagnosis: &Diagnosis<D>, setup: &SetupCheck) -> bool {
     diagnosis.verdict == DiagnosisVerdict::Unknown
         && setup.likely().is_none()
+        && !is_noise(diagnosis.baseline.reduced_chi2)
         && diagnosis.too_little_data.is_none()
 }
 
@@ -187,7 +189,8 @@ const SAME: [(&str, &str); 1] = [("time-delay", "amplifier-low-pass")];
 
 /// A likely mistake of the setup leaves no effect certain: what is missing in the model cannot be told before the files are
 /// right. One that is hardly likelier than an effect which explains the data shares the confidence with it, unless both are
-/// the same thing.
+/// the same thing. Of what was taken out of the measurements no effect has to be doubted; but where nothing else is missing, something
+/// was there that the library has no name for.
 fn heed_setup<D: Modelled>(diagnosis: &mut Diagnosis<D>, setup: &SetupCheck) {
     if let Some(finding) = setup.likely() {
         if diagnosis.verdict == DiagnosisVerdict::Effect && finding.confidence < SURE {
@@ -205,6 +208,9 @@ fn heed_setup<D: Modelled>(diagnosis: &mut Diagnosis<D>, setup: &SetupCheck) {
         diagnosis.companions.clear();
         diagnosis.indistinguishable.clear();
         diagnosis.confidence = finding.confidence;
+    } else if let (DiagnosisVerdict::None, Some(taken_out)) = (diagnosis.verdict, setup.findings.first()) {
+        diagnosis.verdict = DiagnosisVerdict::Unknown;
+        diagnosis.confidence = taken_out.confidence;
     }
 }
 

@@ -1,5 +1,7 @@
 //! Which format a file has, by what stands in it.
 
+use std::path::Path;
+
 use super::contents::Format;
 use super::preview::{columns, lines_for_names, preview};
 use super::text::{self, Lines};
@@ -14,6 +16,18 @@ use crate::ingest::formats::twincat;
 use crate::ingest::formats::uff;
 use crate::ingest::tables::channel_names::{is_called_acceleration, is_called_hammer};
 use crate::ingest::tables::table::Header;
+
+/// Endings of files that nobody exports measurements to.
+const OTHERS: [&str; 16] = [
+    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "zip", "xz", "py", "m", "svg", "parquet",
+    "log", "toml",
+];
+
+/// Whether a file is no measurement by the ending of its name.
+pub fn is_no_measurement(file: &Path) -> bool {
+    let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+    ending.is_some_and(|ending| OTHERS.contains(&ending.as_str()))
+}
 
 /// What was decided, and what the reader needs to know of it.
 pub(super) enum Detected {

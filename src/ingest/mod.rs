@@ -27,6 +27,7 @@ pub use channel_rule::{
     read_forces_with, read_time_with, timeless,
 };
 pub use contents::{Contents, Digest, Format, MeasurementFile, OtherRecord, TimeFile};
+pub use detect::is_no_measurement;
 pub use formats::columns::{
     Cells, ColumnTable, MOST_ROWS, NamedArray, NamedColumn, csv_bytes, mat_bytes, npz_bytes, variable_name,
     xlsx_bytes,

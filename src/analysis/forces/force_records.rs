@@ -195,7 +195,7 @@ mod tests {
         CUT_S, MadeCut, MadeTool, TRUTH, write_campaign, write_campaign_of,
     };
     use crate::cutting::{OTHER_SPEED, WRONG_SPEED, analyse_cut};
-    use crate::data::Process;
+    use crate::data::{CutGeometry, Process};
     use crate::identify::CuttingData;
     use std::f64::consts::TAU;
 
@@ -359,6 +359,15 @@ mod tests {
                 .find(|f| f.kind == "spindle-speed-variation");
             assert_eq!(found.is_some(), varies.is_some(), "{:?}", check.findings);
             assert_eq!(check.likely(), None);
+            // Nothing else is missing; what was taken out has no name in the library.
+            let verdict = match varies {
+                Some(_) => crate::discrepancy::DiagnosisVerdict::Unknown,
+                None => crate::discrepancy::DiagnosisVerdict::None,
+            };
+            let told = crate::analysis::CuttingFindings::run(&campaign, crate::identify::Options::default())
+                .unwrap();
+            assert_eq!(told.diagnosis.verdict, verdict, "{varies:?}");
+            assert!(told.lead.is_none());
             if let (Some(found), Some(rad)) = (found, varies) {
                 let value = found.value.unwrap();
                 assert!((value / rad - 1.0).abs() < 0.2, "{value} {rad}");
@@ -425,6 +434,33 @@ mod tests {
         runout_mm: 0.0,
         exponents: [0.0; 3],
     };
+
+    /// 2 mm deep a ball of 10 mm is 8 mm wide: a side of the work 4.3 mm from the axis stays out of its reach, one 3.5 mm from it does not.
+    #[test]
+    fn a_cut_in_which_a_ball_touches_nothing_is_told() {
+        for (start_deg, told) in [
+            (f64::acos(-0.86).to_degrees(), true),
+            (f64::acos(-0.7).to_degrees(), false),
+        ] {
+            let dir = tempfile::tempdir().unwrap();
+            let cuts = [0.04, 0.08, 0.12].map(|feed_mm| MadeCut {
+                rpm: 1500.0,
+                feed_mm,
+                speed: &|_| 1.0,
+            });
+            let mut campaign = write_campaign_of(dir.path(), BALL, &cuts, &|_, _, _, _, _| 0.0);
+            let CutGeometry::Milling { immersion, .. } = &mut campaign.cuts[1].geometry else {
+                unreachable!()
+            };
+            immersion.start_rad = start_deg.to_radians();
+            let warnings = identify_forces(&Workbench::new(&campaign), CfcOptions::default())
+                .unwrap()
+                .warnings;
+            let of_it =
+                |w: &String| w.starts_with("cut 02: by the stated engagement the tool touches nothing");
+            assert_eq!(warnings.iter().any(of_it), told, "{start_deg}: {warnings:?}");
+        }
+    }
 
     /// A ball end that runs out, a law of the chip with an exponent for each direction, and nothing of the kind: named with their sizes,
     /// and the coefficients are those of the metal.

@@ -531,6 +531,19 @@ mod tests {
         };
         let found = of(&[bad.path(), good.path()]).unwrap();
         assert_eq!((found.sets[0].frfs.len(), found.hits.len()), (1, 1));
+        // What lies beside them.
+        let beside = tempfile::Builder::new().suffix(".md").tempfile().unwrap();
+        let found_beside = of(&[beside.path(), good.path()]).unwrap();
+        assert_eq!(found_beside.sets[0].frfs.len(), 1);
+        assert!(
+            found_beside
+                .warnings
+                .iter()
+                .any(|w| w.contains("passed over: no measurement")),
+            "{:?}",
+            found_beside.warnings
+        );
+        assert!(of(&[beside.path()]).is_err());
         let told = format!("{}: left out: no hit found", bad.path().display());
         assert!(
             found.warnings.iter().any(|w| w.starts_with(&told)),

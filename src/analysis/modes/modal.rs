@@ -12,6 +12,7 @@ pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
 use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, MeasuredDof, Point};
+use crate::ingest::is_no_measurement;
 use crate::modal::chosen::Choice;
 use crate::modal::quality::SetQuality;
 use crate::modal::tracking::{self, Track};
@@ -80,7 +81,8 @@ impl ModalAnalysis {
         campaign.once(|| Self::on(campaign, &Settings::default()))
     }
 
-    /// FRF files and raw tap tests: one set a file, or all files as one set (FRFs exported one by one).
+    /// FRF files and raw tap tests: one set a file, or all files as one set (FRFs exported one by one). Of several files those that are no
+    /// measurements by their names (a README beside them) are passed over and told.
     ///
     /// # Errors
     /// A file that cannot be read or holds neither FRFs nor hits; no good hit in any of them.
@@ -94,9 +96,15 @@ impl ModalAnalysis {
         reading.taps.band_hz = reading.taps.band_hz.or(settings.band_hz);
         let mut inputs = Vec::new();
         let mut told = Told::default();
-        for file in files {
+        let measured = files.iter().any(|file| !is_no_measurement(file.as_ref()));
+        for file in files.iter().map(AsRef::as_ref) {
+            if measured && is_no_measurement(file) {
+                let why = "passed over: no measurement by its name";
+                told.warnings.push(format!("{}: {why}", file.display()));
+                continue;
+            }
             let before = told.hits.len();
-            let mut of_file = read(file.as_ref(), &reading, &mut told)?;
+            let mut of_file = read(file, &reading, &mut told)?;
             // A raw record has its window from here, not from the analyser.
             if reading.added_decay_per_s > 0.0 && told.hits.len() == before {
                 let decay = reading.added_decay_per_s;

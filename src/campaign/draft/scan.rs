@@ -13,7 +13,8 @@ use crate::campaign::campaign_file;
 use crate::data::{Channel, ChannelRole, Quantity, RobotSpec, TimeRecord};
 use crate::ingest::{
     NamedCut, NamedForce, PlainColumn, SIGNALS, Timeless, cuts_of, forces_of, is_called_acceleration,
-    is_called_marker, plain_columns, sheet_text, survey, timeless, unit_of_charge_or_other,
+    is_called_marker, is_no_measurement, plain_columns, sheet_text, survey, timeless,
+    unit_of_charge_or_other,
     units::{self, Dimension},
 };
 use crate::progress::Progress;
@@ -24,11 +25,6 @@ use crate::{Error, InputError, Result};
 const MOST_FILES: usize = 5000;
 /// Folders deep.
 const DEEPEST: usize = 8;
-/// Endings of files that nobody exports measurements to.
-const OTHERS: [&str; 15] = [
-    "html", "png", "jpg", "jpeg", "pdf", "md", "json", "docx", "zip", "xz", "py", "m", "svg", "parquet",
-    "log",
-];
 
 /// Words in the name of a copy.
 const COPY: [&str; 6] = ["kopie", "copy", "copie", "copia", "backup", "sicherung"];
@@ -73,7 +69,7 @@ pub fn scan(dir: &Path) -> Result<Scan> {
             if RobotSpec::load(&name, dir).is_ok() {
                 robots.push(name);
             }
-        } else if !OTHERS.contains(&ending.as_str()) && file != campaign_file(dir) {
+        } else if !is_no_measurement(&file) && file != campaign_file(dir) {
             measurements.push((name, file));
         }
     }
@@ -207,11 +203,7 @@ pub fn measurement_files(dir: &Path) -> Result<Vec<PathBuf>> {
     let root = dir.canonicalize().map_err(|e| Error::io(dir, e))?;
     let mut files = Vec::new();
     collect(dir, &root, 0, &mut files)?;
-    files.retain(|file| {
-        let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let ending = ending.unwrap_or_default();
-        ending != "toml" && !OTHERS.contains(&ending.as_str())
-    });
+    files.retain(|file| !is_no_measurement(file));
     files.sort();
     Ok(files)
 }

@@ -16,6 +16,7 @@ use crate::discrepancy::comparison::explained::Explained;
 use crate::discrepancy::joint_trends::{JointCourse, JointTrend, JointTrends};
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
+use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, Trend};
 use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::rest::{BeyondSlips, RestTest};
@@ -137,8 +138,14 @@ fn outcome<D: CampaignSide>(
         + told
         + &rest(d, next_measurement);
     let winner = d.winner().map(EffectCandidate::label);
-    let next =
-        instead.unwrap_or_else(|| guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what));
+    let only = setup.findings.first().filter(|_| {
+        d.verdict == DiagnosisVerdict::Unknown && setup.taken_out > 0 && is_noise(d.baseline.reduced_chi2)
+    });
+    let next = match (instead, only) {
+        (Some(instead), _) => instead,
+        (None, Some(found)) => format!("look into {}; the model can be used", found.kind),
+        (None, None) => guide.diagnosed(d.verdict, winner.as_deref(), &next_measurement.what),
+    };
     Outcome::new(Document::new(findings, own), text, Some(next))
 }
 
@@ -559,6 +566,10 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
             "{}: {}\n",
             Emphasis::Bad.on("NO VERDICT"),
             d.too_little_data.as_deref().unwrap_or_default()
+        ),
+        _ if is_noise(d.baseline.reduced_chi2) => format!(
+            "{}: what stands first is no effect of the library; apart from it what is left looks like noise ({sure})\n",
+            Emphasis::Bad.on("UNKNOWN")
         ),
         _ => {
             let guess = d

@@ -208,7 +208,7 @@ fn heed_setup<D: Modelled>(diagnosis: &mut Diagnosis<D>, setup: &SetupCheck) {
         diagnosis.companions.clear();
         diagnosis.indistinguishable.clear();
         diagnosis.confidence = finding.confidence;
-    } else if let (DiagnosisVerdict::None, Some(taken_out)) = (diagnosis.verdict, setup.findings.first()) {
+    } else if let (DiagnosisVerdict::None, Some(taken_out)) = (diagnosis.verdict, setup.taken_out().first()) {
         diagnosis.verdict = DiagnosisVerdict::Unknown;
         diagnosis.confidence = taken_out.confidence;
     }

@@ -53,12 +53,8 @@ impl WrongLinks {
         study: &StructureStudy,
         diagnosis: &Diagnosis<Structure>,
     ) -> Result<Option<Self>> {
-        let standing = Standing {
-            model: &case.model,
-            fit: &diagnosis.baseline.calibration,
-            with: None,
-        };
-        if let Some(found) = Self::beside(campaign, case, study, diagnosis, standing)? {
+        let standing = &diagnosis.baseline.calibration;
+        if let Some(found) = Self::beside(campaign, case, study, diagnosis, (None, standing))? {
             return Ok(Some(found));
         }
         let Some(bending) = diagnosis.best_guess.map(|i| &diagnosis.candidates[i]) else {
@@ -70,26 +66,18 @@ impl WrongLinks {
         let problem = study.problem(&bending.model, View::FULL);
         let fit = minimise(&problem, &bending.theta, &bending.model.bounds(), SETTLE)?;
         let fit = Calibration::of_fit(&bending.model.parameters, fit, study.real_values(Extent::Full))?;
-        let standing = Standing {
-            model: &bending.model,
-            fit: &fit,
-            with: Some(bending),
-        };
-        Self::beside(campaign, case, study, diagnosis, standing)
+        Self::beside(campaign, case, study, diagnosis, (Some(bending), &fit))
     }
 
+    /// From the fit of the case's model, or of that with one effect more.
     fn beside(
         campaign: &Campaign,
         case: &StructureCase,
         study: &StructureStudy,
         diagnosis: &Diagnosis<Structure>,
-        standing: Standing<'_>,
+        (effect, before): (Option<&EffectCandidate<Structure>>, &Calibration),
     ) -> Result<Option<Self>> {
-        let Standing {
-            model: as_it_stands,
-            fit: before,
-            with: effect,
-        } = standing;
+        let as_it_stands = effect.map_or(&case.model, |effect| &effect.model);
         let groups: Vec<LinkGroup> = LinkGroup::of_model(as_it_stands.has(LINK_FLEXIBILITY));
         let free = |only: Option<&[String]>| -> Result<StructureModel> {
             let groups = &groups;
@@ -159,13 +147,4 @@ impl WrongLinks {
             beside: effect.map(EffectCandidate::label),
         }))
     }
-}
-
-/// The model from which other links are sought, and its fit.
-#[derive(Clone, Copy)]
-struct Standing<'a> {
-    model: &'a StructureModel,
-    fit: &'a Calibration,
-    /// What the model has beyond the case's.
-    with: Option<&'a EffectCandidate<Structure>>,
 }

@@ -370,12 +370,7 @@ impl SpindleTrack {
         let changes = 0.5 * self.droop.abs() + 2.0 * self.wander;
         let is_sure = self.order as f64 * (self.offset.abs() + changes) < SURE_STEP;
         let is_near = self.offset.abs() < FURTHEST || (is_sure && self.offset.abs() < changes + FURTHEST);
-        is_near && self.is_worth_telling(&self.parts())
-    }
-
-    fn is_worth_telling(&self, parts: &[(f64, f64)]) -> bool {
-        self.order as f64 * self.smear_rad > WORTH_TELLING
-            && parts.iter().any(|(value, std)| value.abs() > SIGMAS * std)
+        is_near && self.order as f64 * self.smear_rad > WORTH_TELLING && self.told().contains(&true)
     }
 
     /// The parts that stand above their errors: offset, droop, wander.
@@ -385,10 +380,8 @@ impl SpindleTrack {
 
     /// Whether droop or wander are worth telling, and not an offset alone.
     pub fn varies(&self) -> bool {
-        self.order as f64 * self.varying_rad() > WORTH_TELLING
-            && self.parts()[1..]
-                .iter()
-                .any(|(value, std)| value.abs() > SIGMAS * std)
+        let [_, droops, wanders] = self.told();
+        self.order as f64 * self.varying_rad() > WORTH_TELLING && (droops || wanders)
     }
 
     /// As [`Self::smear_rad`], against the mean speed instead of the stated one.

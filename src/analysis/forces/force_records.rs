@@ -199,6 +199,10 @@ mod tests {
     use crate::identify::CuttingData;
     use std::f64::consts::TAU;
 
+    fn slots<const N: usize>(rpm: f64, feeds_mm: [f64; N], speed: &dyn Fn(f64) -> f64) -> [MadeCut<'_>; N] {
+        feeds_mm.map(|feed_mm| MadeCut { rpm, feed_mm, speed })
+    }
+
     /// Largest relative error of a cutting coefficient.
     fn worst(result: &CfcResult) -> f64 {
         let off = result.pooled[0].coefficients.iter().zip(TRUTH);
@@ -278,13 +282,7 @@ mod tests {
     fn from_a_speed_that_is_far_off_nothing_is_concluded() {
         let told = |speed: &dyn Fn(f64) -> f64| {
             let dir = tempfile::tempdir().unwrap();
-            let cuts: Vec<MadeCut> = [0.05, 0.1, 0.16]
-                .map(|feed_mm| MadeCut {
-                    rpm: 1200.0,
-                    feed_mm,
-                    speed,
-                })
-                .into();
+            let cuts = slots(1200.0, [0.05, 0.1, 0.16], speed);
             let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
             let bench = Workbench::new(&campaign);
             let warnings = identify_forces(&bench, CfcOptions::default()).unwrap().warnings;
@@ -345,11 +343,7 @@ mod tests {
         ];
         for (speed, varies) in speeds {
             let dir = tempfile::tempdir().unwrap();
-            let cuts = [0.05, 0.1, 0.16].map(|feed_mm| MadeCut {
-                rpm: 1200.0,
-                feed_mm,
-                speed,
-            });
+            let cuts = slots(1200.0, [0.05, 0.1, 0.16], speed);
             let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
             let data = CuttingData::on(&Workbench::new(&campaign), Process::Milling).unwrap();
             let check = crate::discrepancy::setup::examine_cutting(&data, || None).unwrap();
@@ -379,12 +373,8 @@ mod tests {
     #[test]
     fn a_spindle_that_gives_way_by_a_tenth_is_followed() {
         let dir = tempfile::tempdir().unwrap();
-        let cuts = [0.05, 0.1, 0.16].map(|feed_mm| MadeCut {
-            rpm: 1200.0,
-            feed_mm,
-            // From the middle of the cut.
-            speed: &|t| 0.95 - 0.1 * t / CUT_S,
-        });
+        // The speed counts from the middle of the cut.
+        let cuts = slots(1200.0, [0.05, 0.1, 0.16], &|t| 0.95 - 0.1 * t / CUT_S);
         let campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
         let found = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
         for (own, truth) in found.pooled[0].coefficients.iter().zip(TRUTH) {
@@ -443,11 +433,7 @@ mod tests {
             (f64::acos(-0.7).to_degrees(), false),
         ] {
             let dir = tempfile::tempdir().unwrap();
-            let cuts = [0.04, 0.08, 0.12].map(|feed_mm| MadeCut {
-                rpm: 1500.0,
-                feed_mm,
-                speed: &|_| 1.0,
-            });
+            let cuts = slots(1500.0, [0.04, 0.08, 0.12], &|_| 1.0);
             let mut campaign = write_campaign_of(dir.path(), BALL, &cuts, &|_, _, _, _, _| 0.0);
             let CutGeometry::Milling { immersion, .. } = &mut campaign.cuts[1].geometry else {
                 unreachable!()
@@ -480,11 +466,7 @@ mod tests {
             (kienzle, Some("size-effect"), kienzle.exponents.to_vec()),
         ] {
             let dir = tempfile::tempdir().unwrap();
-            let cuts = [0.03, 0.06, 0.1, 0.16].map(|feed_mm| MadeCut {
-                rpm: 1500.0,
-                feed_mm,
-                speed: &|_| 1.0,
-            });
+            let cuts = slots(1500.0, [0.03, 0.06, 0.1, 0.16], &|_| 1.0);
             let campaign = write_campaign_of(dir.path(), tool, &cuts, &|_, _, _, _, _| 0.0);
             let found = crate::analysis::CuttingFindings::run(&campaign, crate::identify::Options::default())
                 .unwrap();
@@ -502,11 +484,7 @@ mod tests {
     #[test]
     fn a_ball_end_gives_back_its_coefficients() {
         let dir = tempfile::tempdir().unwrap();
-        let cuts = [0.04, 0.08, 0.12, 0.16].map(|feed_mm| MadeCut {
-            rpm: 1500.0,
-            feed_mm,
-            speed: &|_| 1.0,
-        });
+        let cuts = slots(1500.0, [0.04, 0.08, 0.12, 0.16], &|_| 1.0);
         let campaign = write_campaign_of(dir.path(), BALL, &cuts, &|_, _, _, _, _| 0.0);
         let result = identify_forces(&Workbench::new(&campaign), CfcOptions::default()).unwrap();
         let found = &result.pooled[0];

@@ -138,9 +138,8 @@ fn outcome<D: CampaignSide>(
         + told
         + &rest(d, next_measurement);
     let winner = d.winner().map(EffectCandidate::label);
-    let only = setup.findings.first().filter(|_| {
-        d.verdict == DiagnosisVerdict::Unknown && setup.taken_out > 0 && is_noise(d.baseline.reduced_chi2)
-    });
+    let is_all = d.verdict == DiagnosisVerdict::Unknown && is_noise(d.baseline.reduced_chi2);
+    let only = setup.taken_out().first().filter(|_| is_all);
     let next = match (instead, only) {
         (Some(instead), _) => instead,
         (None, Some(found)) => format!("look into {}; the model can be used", found.kind),

@@ -523,14 +523,10 @@ fn teeth_notice<S: Sample>(
         return;
     }
     let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
+    let orders = [0, 1].map(|axis| orders[axis].as_slice());
+    let std = [0, 1].map(|axis| std[axis].as_slice());
     if !milling.places.is_empty() {
-        let other = other_than_listed(
-            &milling,
-            [&orders[0], &orders[1]],
-            [&std[0], &std[1]],
-            mean,
-            zero_is_known,
-        );
+        let other = other_than_listed(&milling, orders, std, mean, zero_is_known);
         if let Some(other) = other {
             notices.push(Notice {
                 kind: OTHER_TEETH,
@@ -544,7 +540,7 @@ fn teeth_notice<S: Sample>(
         return;
     }
     let known_mean = zero_is_known.then_some(mean);
-    let slow = tooth_passing_too_weak(&milling, [&orders[0], &orders[1]], [&std[0], &std[1]], known_mean);
+    let slow = tooth_passing_too_weak(&milling, orders, std, known_mean);
     if let Some(slow) = slow {
         notices.push(Notice {
             kind: OTHER_MULTIPLE,
@@ -562,7 +558,7 @@ fn teeth_notice<S: Sample>(
         });
         return;
     }
-    if let Some(part) = idle_tooth(&milling, [&orders[0], &orders[1]], mean, zero_is_known) {
+    if let Some(part) = idle_tooth(&milling, orders, mean, zero_is_known) {
         let n = milling.teeth as f64;
         let strongest = (1..milling.teeth)
             .max_by(|a, b| {
@@ -594,12 +590,7 @@ fn teeth_notice<S: Sample>(
         notices.push(notice);
         return;
     }
-    if let Some(parts) = parts_of_turn(
-        milling.teeth,
-        [&orders[0], &orders[1]],
-        [&std[0], &std[1]],
-        zero_is_known,
-    ) {
+    if let Some(parts) = parts_of_turn(milling.teeth, orders, std, zero_is_known) {
         notices.push(Notice {
             kind: FEWER_PARTS,
             detail: format!(
@@ -611,13 +602,7 @@ fn teeth_notice<S: Sample>(
         });
         return;
     }
-    let back = tooth_back_mm(
-        &milling,
-        [&orders[0], &orders[1]],
-        [&std[0], &std[1]],
-        mean,
-        zero_is_known,
-    );
+    let back = tooth_back_mm(&milling, orders, std, mean, zero_is_known);
     if let Some(back) = back {
         notices.push(Notice {
             kind: if milling.teeth < 4 {

@@ -28,8 +28,8 @@ use crate::{Error, Result};
 pub struct SetupCheck {
     /// Most likely first.
     pub findings: Vec<SetupFinding>,
-    /// So many of the last findings have been taken out of the measurements already: they are told, and no verdict depends on them.
-    pub taken_out: usize,
+    /// How many of the last findings are [`Self::taken_out`].
+    pub(super) last_taken_out: usize,
     /// Weighted misfit per value that the first finding leaves; of the model as it stands where there is none.
     pub reduced_chi2: f64,
     /// Share of what stands above the noise that the first finding explains, 0..1.
@@ -44,8 +44,13 @@ impl SetupCheck {
 
     /// The finding that is believed and still in the measurements, if one is.
     pub fn likely(&self) -> Option<&SetupFinding> {
-        let left = self.findings.len().saturating_sub(self.taken_out);
+        let left = self.findings.len() - self.last_taken_out;
         self.findings[..left].first().filter(|f| f.is_likely())
+    }
+
+    /// Findings that have been taken out of the measurements already: they are told, and no effect has to be doubted for them.
+    pub fn taken_out(&self) -> &[SetupFinding] {
+        &self.findings[self.findings.len() - self.last_taken_out..]
     }
 }
 

@@ -442,3 +442,36 @@ fn the_score_of_a_gain_is_its_size_and_what_it_cost() {
     let best = scores.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)).unwrap();
     assert_eq!(best.group, group);
 }
+
+/// A finding that is hardly one, and one that was taken out of the measurements while they were read: neither keeps a verdict from being
+/// certain, and only the latter was there for sure.
+#[test]
+fn what_was_taken_out_is_no_longer_likely() {
+    let finding = |confidence: f64| SetupFinding {
+        kind: "spindle-speed-variation",
+        place: "all cuts".into(),
+        value: Some(0.2),
+        std_error: Some(0.01),
+        unit: "rad",
+        confidence,
+        remedy: "look".into(),
+    };
+    let check = |confidences: &[f64], last_taken_out: usize| SetupCheck {
+        findings: confidences.iter().map(|c| finding(*c)).collect(),
+        last_taken_out,
+        ..SetupCheck::default()
+    };
+    for (confidences, last_taken_out, likely, taken_out) in [
+        (vec![], 0, None, vec![]),
+        (vec![0.3], 0, None, vec![]),
+        (vec![0.9, 0.2], 0, Some(0.9), vec![]),
+        (vec![0.97], 1, None, vec![0.97]),
+        (vec![0.3, 0.97], 1, None, vec![0.97]),
+        (vec![0.8, 0.97], 1, Some(0.8), vec![0.97]),
+    ] {
+        let check = check(&confidences, last_taken_out);
+        assert_eq!(check.likely().map(|f| f.confidence), likely, "{confidences:?}");
+        let out: Vec<f64> = check.taken_out().iter().map(|f| f.confidence).collect();
+        assert_eq!(out, taken_out, "{confidences:?}");
+    }
+}

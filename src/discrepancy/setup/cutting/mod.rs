@@ -40,7 +40,7 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     let known = check.findings.iter().any(|f| f.kind == SPEED_VARIATION);
     if let Some(finding) = speed_variation(data).filter(|_| !known) {
         check.findings.push(finding);
-        check.taken_out = 1;
+        check.last_taken_out = 1;
     }
     Ok(check)
 }

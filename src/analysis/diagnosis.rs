@@ -5,7 +5,6 @@ use super::workbench::Workbench;
 use crate::Result;
 use crate::campaign::Campaign;
 use crate::discrepancy::setup::{Rival, SetupCheck};
-use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{
     Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, diagnose, diagnose_from,
 };
@@ -51,7 +50,7 @@ pub struct Leading<D: CampaignSide> {
 fn is_unnamed<D: Modelled>(diagnosis: &Diagnosis<D>, setup: &SetupCheck) -> bool {
     diagnosis.verdict == DiagnosisVerdict::Unknown
         && setup.likely().is_none()
-        && !is_noise(diagnosis.baseline.reduced_chi2)
+        && diagnosis.apart_from_files().is_none()
         && diagnosis.too_little_data.is_none()
 }
 

@@ -1,7 +1,7 @@
 //! What the loop answers: the verdict, how sure it is, and the candidates that it rests on.
 
 use super::candidate::{BaselineFit, EffectCandidate};
-use super::verdict::DiagnosisVerdict;
+use super::verdict::{DiagnosisVerdict, is_noise};
 use crate::identify::Modelled;
 
 /// The answer.
@@ -36,6 +36,14 @@ impl<D: Modelled> Diagnosis<D> {
     /// The candidate that is missing; `None` where the verdict names none.
     pub fn winner(&self) -> Option<&EffectCandidate<D>> {
         self.effect.map(|w| &self.candidates[w])
+    }
+
+    /// The model as it stands leaves noise, and the verdict is unknown for what was found among the files: why, in words.
+    pub fn apart_from_files(&self) -> Option<&'static str> {
+        let only_files = self.verdict == DiagnosisVerdict::Unknown && is_noise(self.baseline.reduced_chi2);
+        only_files.then_some(
+            "what was found among the files is no effect of the library; apart from it what is left looks like noise",
+        )
     }
 
     /// `It explains 93 % of what stands above the noise; what it leaves is …`, where small errors of the setup explain nearly all of that;

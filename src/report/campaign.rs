@@ -89,7 +89,7 @@ fn cards(findings: &CampaignFindings) -> Vec<VerdictCard> {
     let campaign = findings.campaign;
     let (structure, cutting) = (findings.structure(), findings.cutting_diagnosis());
     let own = |check: Option<&SetupCheck>| -> Vec<SetupFinding> {
-        let all = check.into_iter().flat_map(|c| c.findings.iter());
+        let all = check.into_iter().flat_map(|c| c.still_there());
         all.filter(|f| f.is_likely()).cloned().collect()
     };
     // Without diagnoses nobody knows which side a mistake belongs to: it stands on the first card.

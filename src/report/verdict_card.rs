@@ -182,6 +182,11 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
         let place = found.places.first()?;
         Some((place, place.best.as_ref()?))
     });
+    if let Some(why) = d.apart_from_files() {
+        card.headline = "Nothing is missing apart from what was found among the files".into();
+        card.explanation = sentence(why);
+        return;
+    }
     card.explanation = "What is left is real, but no effect that this program knows explains it.".into();
     card.headline = match drawn {
         Some((place, best)) => {
@@ -263,25 +268,7 @@ fn files_first(card: &mut VerdictCard, findings: &[&SetupFinding]) {
         _ => "A file or a setting looks wrong. Which physics is missing cannot be told before it is right."
             .into(),
     };
-    let mut facts = Vec::new();
-    for finding in findings {
-        let size = match (finding.value, finding.std_error) {
-            (Some(value), error) => {
-                format!("{}. ", plus_minus(value, error.unwrap_or(f64::NAN), finding.unit))
-            }
-            (None, _) => String::new(),
-        };
-        facts.push((
-            "What is wrong",
-            format!(
-                "{} ({}): {size}{}, {}",
-                words::effect(finding.kind),
-                finding.place,
-                words::confidence(finding.confidence),
-                finding.remedy
-            ),
-        ));
-    }
+    let mut facts: Vec<_> = findings.iter().map(|f| ("What is wrong", in_full(f))).collect();
     if card.tone != Tone::Missing {
         card.facts.clear();
         card.check = None;
@@ -290,6 +277,23 @@ fn files_first(card: &mut VerdictCard, findings: &[&SetupFinding]) {
     card.facts = facts;
     card.tone = Tone::Files;
     card.next = format!("{} Then run the same command again.", sentence(&first.remedy));
+}
+
+/// What was found, how large and how sure, and the remedy.
+fn in_full(finding: &SetupFinding) -> String {
+    let size = match (finding.value, finding.std_error) {
+        (Some(value), error) => {
+            format!("{}. ", plus_minus(value, error.unwrap_or(f64::NAN), finding.unit))
+        }
+        (None, _) => String::new(),
+    };
+    format!(
+        "{} ({}): {size}{}, {}",
+        words::effect(finding.kind),
+        finding.place,
+        words::confidence(finding.confidence),
+        finding.remedy
+    )
 }
 
 /// The robot's side; `files`: likely mistakes of the setup. `None` where no model could be fitted.
@@ -554,6 +558,9 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
         card.facts
             .insert(0, ("Where it shows", place.trim_start_matches("at ").into()));
     }
+    let taken_out = found.setup.taken_out().iter();
+    card.facts
+        .extend(taken_out.map(|f| ("Taken out of the records", in_full(f))));
     if let Some(first) = found.lead.as_ref().and_then(|l| l.lines.first()) {
         card.facts.insert(
             0,
@@ -581,6 +588,9 @@ pub fn cutting(campaign: &Campaign, files: &[SetupFinding], found: &CuttingFindi
             winner.label()
         ),
         (DiagnosisVerdict::None, _) => format!("use the coefficients: `lobestone cfc {dir}`"),
+        _ if d.apart_from_files().is_some() => {
+            format!("look into what was found; the coefficients can be used: `lobestone cfc {dir}`")
+        }
         _ => found.next_measurement.to_string(),
     };
     card.next = sentence(&card.next);

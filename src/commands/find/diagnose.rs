@@ -16,7 +16,6 @@ use crate::discrepancy::comparison::explained::Explained;
 use crate::discrepancy::joint_trends::{JointCourse, JointTrend, JointTrends};
 use crate::discrepancy::localise::Localisation;
 use crate::discrepancy::setup::SetupFinding;
-use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{CuttingLead, Diagnosis, DiagnosisVerdict, EffectCandidate, NextMeasurement, Trend};
 use crate::identify::frfs::structure_study::{ResidualPeak, residual_peaks};
 use crate::identify::rest::{BeyondSlips, RestTest};
@@ -138,8 +137,7 @@ fn outcome<D: CampaignSide>(
         + told
         + &rest(d, next_measurement);
     let winner = d.winner().map(EffectCandidate::label);
-    let is_all = d.verdict == DiagnosisVerdict::Unknown && is_noise(d.baseline.reduced_chi2);
-    let only = setup.taken_out().first().filter(|_| is_all);
+    let only = d.apart_from_files().and(setup.taken_out().first());
     let next = match (instead, only) {
         (Some(instead), _) => instead,
         (None, Some(found)) => format!("look into {}; the model can be used", found.kind),
@@ -566,18 +564,14 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
             Emphasis::Bad.on("NO VERDICT"),
             d.too_little_data.as_deref().unwrap_or_default()
         ),
-        _ if is_noise(d.baseline.reduced_chi2) => format!(
-            "{}: what stands first is no effect of the library; apart from it what is left looks like noise ({sure})\n",
-            Emphasis::Bad.on("UNKNOWN")
-        ),
         _ => {
             let guess = d
                 .best_guess_in_words()
                 .map_or(String::new(), |words| wrapped(&words, "  "));
-            format!(
-                "{}: what is left is real, but no effect of the library explains it ({sure})\n{guess}",
-                Emphasis::Bad.on("UNKNOWN")
-            )
+            let why = d
+                .apart_from_files()
+                .unwrap_or("what is left is real, but no effect of the library explains it");
+            format!("{}: {why} ({sure})\n{guess}", Emphasis::Bad.on("UNKNOWN"))
         }
     }
 }

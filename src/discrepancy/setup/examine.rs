@@ -44,8 +44,12 @@ impl SetupCheck {
 
     /// The finding that is believed and still in the measurements, if one is.
     pub fn likely(&self) -> Option<&SetupFinding> {
-        let left = self.findings.len() - self.last_taken_out;
-        self.findings[..left].first().filter(|f| f.is_likely())
+        self.still_there().first().filter(|f| f.is_likely())
+    }
+
+    /// Findings that are in the measurements as they were fitted.
+    pub fn still_there(&self) -> &[SetupFinding] {
+        &self.findings[..self.findings.len() - self.last_taken_out]
     }
 
     /// Findings that have been taken out of the measurements already: they are told, and no effect has to be doubted for them.

@@ -61,10 +61,13 @@ pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String 
                 d.too_little_data.as_deref().unwrap_or_default()
             )
         }
-        _ => format!(
-            "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
-             that this program does not know."
-        ),
+        _ => match d.apart_from_files() {
+            Some(why) => format!("Unknown to the library ({sure}): {why}."),
+            None => format!(
+                "The model lacks something that no effect of the library explains ({sure}): what is left is real, but of a kind \
+                 that this program does not know."
+            ),
+        },
     };
     if let Some(guess) = d.best_guess_in_words() {
         text += &format!(" {guess}");

@@ -139,10 +139,18 @@ pub fn fit_force_coefficients(
     })
 }
 
-/// Not one of so many cuts can be used: why the first cannot.
+/// Not one of so many cuts can be used: why the first cannot, with what would help it.
 pub(crate) fn none_usable(cuts: usize, first_error: Option<Error>) -> Error {
-    let cause = first_error.map_or_else(String::new, |e| format!("; the first: {e}"));
-    InputError::new(format!("none of the {cuts} cuts can be used{cause}")).into()
+    let none = format!("none of the {cuts} cuts can be used");
+    match first_error {
+        Some(Error::Input(first)) => InputError {
+            problem: format!("{none}; the first: {}", first.problem),
+            ..*first
+        },
+        Some(other) => InputError::new(format!("{none}; the first: {other}")),
+        None => InputError::new(none),
+    }
+    .into()
 }
 
 fn add_rows(trials: &CuttingTrials, analysis: &CutAnalysis, rows: &mut Rows) -> Result<()> {

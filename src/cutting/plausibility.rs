@@ -4,6 +4,7 @@ use super::cutting_trials::CuttingTrials;
 use crate::cutting::force_model::average_force::average_row;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::cut_analysis::{ChannelAnalysis, CutAnalysis};
+use crate::cutting::measured::leak::HIGH_PASS;
 use crate::data::{CutGeometry, Process};
 use crate::signal::median;
 use crate::text::figures;
@@ -159,8 +160,15 @@ const TORQUE_UNITS: [(f64, &str); 5] = [
     (1.355_818, "ft·lbf called N·m"),
 ];
 
-/// Warnings about scales that cannot be; `cuts` are of one material.
+/// Warnings about scales that cannot be; `cuts` are of one material. Those whose mean force a high-pass took away say nothing of
+/// units.
 pub(super) fn of_scales(trials: &CuttingTrials, cuts: &[&CutAnalysis], process: Process) -> Vec<String> {
+    let is_whole = |cut: &CutAnalysis| cut.notices.iter().all(|n| n.kind != HIGH_PASS);
+    let cuts: Vec<&CutAnalysis> = cuts.iter().copied().filter(|c| is_whole(c)).collect();
+    let cuts = cuts.as_slice();
+    if cuts.is_empty() {
+        return Vec::new();
+    }
     let specific: Vec<Specific> = cuts.iter().filter_map(|c| specific(trials, c)).collect();
     let middle = |pick: fn(&Specific) -> Option<f64>| {
         let values: Vec<f64> = specific.iter().filter_map(pick).map(f64::abs).collect();

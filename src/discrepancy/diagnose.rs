@@ -389,7 +389,16 @@ impl<'a, S: Study> Engine<'a, S> {
             }
             _ => None,
         };
-        let mut decision = verdict::decide(&candidates, &credible, leader, &baseline, set, evidence.scale);
+        let values = self.freedom(model, Extent::Full) * evidence.share;
+        let mut decision = verdict::decide(
+            &candidates,
+            &credible,
+            leader,
+            &baseline,
+            set,
+            evidence.scale,
+            values,
+        );
         let too_little_data = self
             .too_little_data()
             .or_else(|| explains_nothing(baseline.residual.nrms, baseline.reduced_chi2));

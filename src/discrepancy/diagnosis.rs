@@ -1,7 +1,7 @@
 //! What the loop answers: the verdict, how sure it is, and the candidates that it rests on.
 
 use super::candidate::{BaselineFit, EffectCandidate};
-use super::verdict::{DiagnosisVerdict, is_noise};
+use super::verdict::{DiagnosisVerdict, leaves_noise};
 use crate::identify::Modelled;
 
 /// The answer.
@@ -40,10 +40,23 @@ impl<D: Modelled> Diagnosis<D> {
 
     /// The model as it stands leaves noise, and the verdict is unknown for what was found among the files: why, in words.
     pub fn apart_from_files(&self) -> Option<&'static str> {
-        let only_files = self.verdict == DiagnosisVerdict::Unknown && is_noise(self.baseline.reduced_chi2);
+        let only_files = self.verdict == DiagnosisVerdict::Unknown
+            && leaves_noise(&self.baseline.rest, self.baseline.reduced_chi2);
         only_files.then_some(
             "what was found among the files is no effect of the library; apart from it what is left looks like noise",
         )
+    }
+
+    /// `It may be small errors of every setup: …`, where these explain nearly all that the model leaves and the verdict is unknown all the
+    /// same.
+    pub fn slips_in_words(&self) -> Option<String> {
+        let excuse = self.baseline.rest.excuse_in_words()?;
+        let is_unknown = self.verdict == DiagnosisVerdict::Unknown;
+        is_unknown.then(|| {
+            format!(
+                "It may be small errors of the setup, of sizes that rarely come together: what is left is {excuse}."
+            )
+        })
     }
 
     /// `It explains 93 % of what stands above the noise; what it leaves is …`, where small errors of the setup explain nearly all of that;

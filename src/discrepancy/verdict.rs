@@ -149,7 +149,7 @@ pub struct Decision {
 const MOST_SURE: f64 = 0.98;
 
 /// Whether what is left is noise, by its structure; by its size where there is too little data for that.
-fn leaves_noise(rest: &Rest, reduced_chi2: f64) -> bool {
+pub(crate) fn leaves_noise(rest: &Rest, reduced_chi2: f64) -> bool {
     match rest.tests.is_empty() {
         true => is_noise(reduced_chi2),
         false => !rest.is_significant(),
@@ -172,7 +172,8 @@ pub fn leaves_room<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit) 
     leaves_structure(c) && odds_against(c, baseline) > SETTLED
 }
 
-/// `leader`: the credible candidate that explains most; `set`: the best of several effects together, where that was sought.
+/// `leader`: the credible candidate that explains most; `set`: the best of several effects together, where that was sought; `scale`
+/// divides differences of χ²; `values`: independent ones.
 pub fn decide<D: Modelled>(
     candidates: &[EffectCandidate<D>],
     credible: &[bool],
@@ -180,6 +181,7 @@ pub fn decide<D: Modelled>(
     baseline: &BaselineFit,
     set: Option<EffectSet>,
     scale: f64,
+    values: f64,
 ) -> Decision {
     let mut decision = Decision {
         verdict: DiagnosisVerdict::None,
@@ -206,7 +208,7 @@ pub fn decide<D: Modelled>(
         (None, None) => 1.0,
     };
     let Some(w) = first.filter(|_| excused < 0.5) else {
-        decide_without_candidate(&mut decision, candidates, baseline);
+        decide_without_candidate(&mut decision, candidates, baseline, values);
         return decision;
     };
     let winner = &candidates[w];
@@ -307,8 +309,8 @@ const MOST_EVIDENCE: f64 = 100.0;
 /// No verdict is less sure than this.
 const LEAST_SURE: f64 = 0.05;
 
-/// Odds that something is hidden although no candidate is credible and no test is sure, against nothing.
-fn odds_of_something_faint<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest) -> f64 {
+/// Odds that something is hidden although no candidate is credible and no test is sure, against nothing. `values`: independent ones.
+fn odds_of_something_faint<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest, values: f64) -> f64 {
     let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
     let of_tests = something_else::evidence_of_chance(least * rest.tests.len().max(1) as f64);
     // Credible or not: an effect of an impossible size may stand in for what there is. BIC counts what a free frequency or
@@ -317,7 +319,7 @@ fn odds_of_something_faint<D: Modelled>(candidates: &[EffectCandidate<D>], rest:
     let sum: f64 = refined
         .map(|c| (-0.5 * c.delta_bic).min(MOST_EVIDENCE).exp())
         .sum();
-    something_else::odds_of_something_faint(of_tests, sum / candidates.len().max(1) as f64)
+    something_else::odds_of_something_faint(of_tests, sum / candidates.len().max(1) as f64, values)
 }
 
 /// No candidate is credible: nothing is missing, or something else.
@@ -325,10 +327,12 @@ fn decide_without_candidate<D: Modelled>(
     decision: &mut Decision,
     candidates: &[EffectCandidate<D>],
     baseline: &BaselineFit,
+    values: f64,
 ) {
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
-        let hidden = odds_of_something_faint(candidates, &baseline.rest);
-        if hidden < ALARM {
+        let hidden = odds_of_something_faint(candidates, &baseline.rest, values);
+        // Few data make nothing less sure, they are no reason for an alarm.
+        if odds_of_something_faint(candidates, &baseline.rest, f64::INFINITY) < ALARM {
             decision.verdict = DiagnosisVerdict::None;
             decision.confidence = MOST_SURE / (1.0 + hidden);
         } else {

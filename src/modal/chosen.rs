@@ -7,7 +7,8 @@ use num_complex::Complex64;
 use super::pole_fit::PoleFit;
 use super::shape;
 use super::stabilisation::Stability;
-use crate::modal::together::global_modes::{GlobalMode, GlobalModes};
+use crate::modal::together::findings;
+use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use crate::modal::together::reconstruction::Reconstruction;
 use crate::signal::median;
 
@@ -89,6 +90,7 @@ impl Choice {
             mode.shape = shape_of(&mode.constants, dofs);
             mode.complexity = shape::complexity(&mode.shape.iter().map(|s| s.1).collect::<Vec<_>>());
         }
+        let (mut unexplained, mut measured) = (0.0, 0.0);
         for (reconstruction, fit) in found.reconstructions.iter_mut().zip(fits) {
             if let (Some(r), Some(fit)) = (reconstruction, fit) {
                 let mobility = |z: &Complex64, f: &f64| (TAU * f * z.norm()).powi(2);
@@ -104,14 +106,28 @@ impl Choice {
                 }
                 r.error_nrms = (error / total).sqrt();
                 r.fitted_m_per_n = fit.fitted_m_per_n;
+                unexplained += (error - r.noise_nrms.powi(2) * total).max(0.0);
+                measured += total;
             }
         }
-        let residues: Vec<Vec<Complex64>> = modes
-            .iter()
-            .map(|m| m.constants.iter().flatten().map(|c| c.0).collect())
-            .collect();
-        let likeness = |a: &Vec<Complex64>| residues.iter().map(|b| shape::mac(a, b)).collect();
-        found.mac = residues.iter().map(likeness).collect();
+        if measured > 0.0 {
+            found.quality.unexplained_share = unexplained / measured;
+        }
+        let is_kept = |m: &GlobalMode| {
+            modes
+                .iter()
+                .any(|k| (k.frequency_hz / m.frequency_hz - 1.0).abs() < MEANT)
+        };
+        let gone = found.modes.iter().filter(|m| !is_kept(m));
+        found.rejected.extend(gone.map(|m| RejectedMode {
+            frequency_hz: m.frequency_hz,
+            damping_ratio: m.damping_ratio,
+            reason: "left out as it was asked for".into(),
+        }));
+        found
+            .rejected
+            .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        found.mac = findings::mac(&modes);
         found.modes = modes;
         Ok(())
     }

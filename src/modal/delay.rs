@@ -24,11 +24,15 @@ const SEEN: f64 = 4.0;
 /// The delay must explain so much of Σ(sin φ/σ)², and leave no more than this a mode.
 const EXPLAINS: f64 = 16.0;
 const LEFT: f64 = 4.0;
-/// Steps of the search to either side.
+/// Steps of the search in a quarter period of the highest mode.
 const STEPS: i32 = 400;
+/// So many modes tell delays of so many quarter periods; fewer would agree with several.
+const MANY_MODES: usize = 5;
+const MANY_QUARTERS: i32 = 8;
 
 /// Delay from the modes of one FRF: frequency, Hz, constant and its standard deviation. `None` where too few modes are
-/// seen, or none is needed. Delays up to a quarter period of the highest mode are found.
+/// seen, none is needed, or another one would do as well. Delays up to a quarter period of the highest mode are found, with five modes
+/// and more up to two periods.
 pub fn delay(modes: &[(f64, Complex64, f64)]) -> Option<Delay> {
     let seen: Vec<(f64, f64, f64)> = modes
         .iter()
@@ -46,16 +50,21 @@ pub fn delay(modes: &[(f64, Complex64, f64)]) -> Option<Delay> {
         each.sum()
     };
     let step = 0.25 * TAU / highest / f64::from(STEPS);
-    let best = (-STEPS..=STEPS)
-        .map(|k| f64::from(k) * step)
-        .min_by(|a, b| cost(*a).total_cmp(&cost(*b)))?;
+    let quarters = if seen.len() < MANY_MODES { 1 } else { MANY_QUARTERS };
+    let tried: Vec<(i32, f64)> = (-quarters * STEPS..=quarters * STEPS)
+        .map(|k| (k, cost(f64::from(k) * step)))
+        .collect();
+    let (at, left) = tried.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let best = f64::from(at) * step;
+    let alone = tried
+        .iter()
+        .all(|(k, other)| (k - at).abs() <= STEPS || other - left > EXPLAINS);
     // Curvature of the sum of squares at its minimum.
     let information: f64 = seen.iter().map(|(w, _, std)| (w / std).powi(2)).sum();
-    let left = cost(best);
     let needed = cost(0.0) - left > EXPLAINS;
     let fits = left < LEFT * (seen.len() - 1) as f64;
-    let inside = best.abs() < step * f64::from(STEPS - 1);
-    (needed && fits && inside).then(|| Delay {
+    let inside = at.abs() < quarters * STEPS - 1;
+    (needed && fits && inside && alone).then(|| Delay {
         seconds: best,
         std_s: (1.0 / information).sqrt(),
     })
@@ -142,6 +151,25 @@ mod tests {
         // One sample at 10 kHz is no more than complexity.
         assert_eq!(delay(&modes(1e-4, 0.05)), None);
         assert_eq!(delay(&modes(2e-3, 0.0)[..2]), None);
+    }
+
+    #[test]
+    fn a_delay_of_more_than_a_quarter_period_is_told_by_many_modes() {
+        let modes = |hz: &[f64], tau: f64| -> Vec<(f64, Complex64, f64)> {
+            let one = |(k, f): (usize, &f64)| {
+                let size = [0.5, -1.0, 0.7, -0.2][k % 4];
+                (*f, Complex64::from_polar(1.0, -TAU * f * tau) * size, 0.005)
+            };
+            hz.iter().enumerate().map(one).collect()
+        };
+        let seven = [41.0, 97.0, 163.0, 230.0, 318.0, 405.0, 530.0];
+        for tau in [0.59e-3, 0.98e-3, -1.7e-3] {
+            let found = delay(&modes(&seven, tau)).unwrap();
+            assert!((found.seconds - tau).abs() < 3e-6, "{found:?} for {tau}");
+        }
+        // Modes at equal distances repeat their phases.
+        let even = [100.0, 200.0, 300.0, 400.0, 500.0];
+        assert_eq!(delay(&modes(&even, 2.4e-3)), None);
     }
 
     #[test]

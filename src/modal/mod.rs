@@ -29,7 +29,7 @@ pub mod tracking;
 pub use hits::Hit;
 pub use impact_test::{Estimator, TapFrfs, TapRecord, TapSettings, impact_test};
 pub use settings::Settings;
-pub use sine_lines::{SineLine, sine_lines, without_sines};
+pub use sine_lines::{SineLine, sine_lines, undamped_hum, without_sines};
 pub use single::analysis::{analyse_frf, analyse_frfs};
 pub use single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 pub use stabilisation::Tolerances;

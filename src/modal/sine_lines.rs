@@ -91,16 +91,28 @@ pub fn without_sines(
 }
 
 fn what(frequency_hz: f64, step_hz: f64) -> String {
-    for mains in MAINS_HZ {
+    mains(frequency_hz, step_hz).unwrap_or_else(|| "a sine: something that runs nearby".into())
+}
+
+/// The mains, or the multiple of theirs, that lies within `step_hz` of a frequency (Hz), in words.
+fn mains(frequency_hz: f64, step_hz: f64) -> Option<String> {
+    MAINS_HZ.into_iter().find_map(|mains| {
         let harmonic = (frequency_hz / mains).round();
-        if (1.0..=20.0).contains(&harmonic) && (frequency_hz - harmonic * mains).abs() <= step_hz {
-            return match harmonic as usize {
-                1 => format!("mains hum of {mains:.0} Hz"),
-                n => format!("harmonic {n} of the {mains:.0} Hz mains"),
-            };
-        }
-    }
-    "a sine: something that runs nearby".into()
+        let is_near = (1.0..=20.0).contains(&harmonic) && (frequency_hz - harmonic * mains).abs() <= step_hz;
+        is_near.then(|| match harmonic as usize {
+            1 => format!("mains hum of {mains:.0} Hz"),
+            n => format!("harmonic {n} of the {mains:.0} Hz mains"),
+        })
+    })
+}
+
+/// The hum that a mode is, in words: at a multiple of the mains, and so little damped that it would go on through the whole record as a
+/// sine does. A window that dies away broadens a sine's line, which then looks like a mode. `step_hz`: between lines, Hz.
+pub fn undamped_hum(frequency_hz: f64, damping_ratio: f64, step_hz: f64) -> Option<String> {
+    /// Of the distance between lines, which is one over the record's length.
+    const UNDAMPED: f64 = 0.1;
+    let goes_on = damping_ratio * frequency_hz < UNDAMPED * step_hz;
+    goes_on.then(|| mains(frequency_hz, 0.5 * step_hz)).flatten()
 }
 
 /// Least squares of constant, slope, curvature and a resonance 1/x on the lines ±(SPREAD + 1 … SPREAD + FLANK) around a
@@ -210,6 +222,20 @@ impl Flanks {
 mod tests {
     use super::super::synthetic::{Synthetic, SyntheticMode};
     use super::*;
+
+    #[test]
+    fn a_pole_at_the_mains_that_never_dies_away_is_hum() {
+        assert_eq!(
+            undamped_hum(50.02, 1e-4, 0.25).as_deref(),
+            Some("mains hum of 50 Hz")
+        );
+        assert_eq!(
+            undamped_hum(180.1, -1e-5, 0.25).as_deref(),
+            Some("harmonic 3 of the 60 Hz mains")
+        );
+        assert_eq!(undamped_hum(50.02, 1e-3, 0.25), None);
+        assert_eq!(undamped_hum(50.2, 1e-4, 0.25), None);
+    }
 
     fn found(modes: &[SyntheticMode], hum: f64) -> Vec<SineLine> {
         let mut frequency = Vec::new();

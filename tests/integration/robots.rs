@@ -326,9 +326,14 @@ fn what_is_no_arm_is_refused_in_words() {
         ),
         (
             "seven.urdf",
-            seven.replace("<mass value", "<mass weight"),
+            seven.replacen("mass value=\"3.4\"", "mass weight=\"3.4\"", 1),
             &[],
-            &["no URDF that can be read"],
+            &[
+                "no URDF that can be read",
+                "seven.urdf:",
+                ": link a4: ",
+                "correct this link",
+            ],
         ),
     ];
     for (name, content, flags, words) in cases {

@@ -1,15 +1,15 @@
 //! A campaign's cutting side loaded: force records and the revisions of their model.
 
-use crate::analysis::forces::force_records::ForceRecords;
+use crate::analysis::forces::force_records::{ForceRecords, in_campaign_file};
 use crate::analysis::grown::with_revision;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, Process};
-use crate::cutting::{contradicts_speed, of_notices};
+use crate::cutting::{contradicts_speed, none_usable, of_notices};
 use crate::effects::Registry;
 use crate::identify::forces::cutting_data::processes;
 use crate::identify::model_history::Side;
 use crate::identify::{Case, CuttingCase, CuttingData, CuttingModel};
-use crate::{Error, InputError, Result};
+use crate::{InputError, Result};
 
 fn material(campaign: &Campaign, cut: usize) -> &str {
     campaign.cuts[cut].material.as_deref().unwrap_or("no material")
@@ -101,21 +101,24 @@ impl CuttingData {
         }
         let records = ForceRecords::of(campaign);
         let (mut cuts, mut warnings, mut noticed) = (Vec::new(), Vec::new(), Vec::new());
+        let mut first_error = None;
         for &i in &indices {
             match &records.waveforms[i] {
                 Ok((cut, notices)) => {
                     noticed.extend(notices.iter().map(|n| (cut.id.clone(), n.clone())));
                     cuts.push(cut.clone());
                 }
-                Err(error) => warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id)),
+                Err(error) => {
+                    warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id));
+                    first_error.get_or_insert(error.clone());
+                }
             }
         }
         if cuts.is_empty() {
-            return Err(Error::computation(format!(
-                "none of the {} cuts can be used; the first: {}",
-                indices.len(),
-                warnings.first().map_or("", String::as_str)
-            )));
+            return Err(in_campaign_file(
+                none_usable(indices.len(), first_error),
+                campaign,
+            ));
         }
         let contradicting = cuts
             .iter()
@@ -129,10 +132,7 @@ impl CuttingData {
         warnings.extend(of_notices(&noticed, indices.len()));
         let teeth = campaign.tool.as_ref().map_or(1, |t| t.teeth);
         let data = CuttingData::new(process, teeth, campaign.dynamometer.tool_from_dyno, cuts);
-        let data = data.map_err(|error| match error {
-            Error::Input(error) => error.file(campaign.dir.join("campaign.toml")).into(),
-            other => other,
-        })?;
+        let data = data.map_err(|error| in_campaign_file(error, campaign))?;
         Ok(CuttingData {
             warnings,
             speed_is_contradicted,

@@ -158,16 +158,26 @@ fn waveform<S: Sample>(campaign: &Campaign, cut: usize, reading: &RecordReading<
     Ok((data, analysis.notices.clone()))
 }
 
+/// Puts an error that names no file into the campaign's, at its cuts where it names no key.
+pub(super) fn in_campaign_file(error: Error, campaign: &Workbench) -> Error {
+    match error {
+        Error::Input(input) if input.file.is_none() => {
+            let key = input.key.clone().unwrap_or_else(|| "cut".to_owned());
+            input.file(campaign.dir.join("campaign.toml")).key(key).into()
+        }
+        other => other,
+    }
+}
+
 /// Fits the coefficients to the averages of every cut. A cut that cannot be used is left out with a warning that names it.
 ///
 /// # Errors
 /// No cuts, no tool, or not one usable record.
 pub fn identify_forces(campaign: &Workbench, options: CfcOptions) -> Result<CfcResult> {
-    let campaign_file = || campaign.dir.join("campaign.toml");
     if campaign.cuts.is_empty() {
         return Err(
             InputError::new("the campaign has no [[cut]]: nothing to identify cutting forces from")
-                .file(campaign_file())
+                .file(campaign.dir.join("campaign.toml"))
                 .key("cut")
                 .remedy("add [[cut]] tables that name the force records")
                 .into(),
@@ -182,10 +192,7 @@ pub fn identify_forces(campaign: &Workbench, options: CfcOptions) -> Result<CfcR
             outcomes.into_iter().find_map(Result::err),
         )),
     };
-    result.map_err(|error| match error {
-        Error::Input(input) if input.file.is_none() => input.file(campaign_file()).key("cut").into(),
-        other => other,
-    })
+    result.map_err(|error| in_campaign_file(error, campaign))
 }
 
 #[cfg(test)]

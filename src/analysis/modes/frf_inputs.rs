@@ -70,8 +70,9 @@ pub(crate) fn settle_unsaid(inputs: &mut [FrfInput], reading: &FrfReading, told:
     for unsaid in &told.unsaid {
         let theirs = |i: &&mut FrfInput| i.set == unsaid.file && unsaid.names.contains(&i.name);
         for input in inputs.iter_mut().filter(theirs).filter(|_| order != 0) {
+            let decay = input.added_decay_per_s;
             for (f, v) in input.frequency_hz.iter().zip(&mut input.receptance_m_per_n) {
-                *v /= Complex64::new(0.0, TAU * f).powi(order);
+                *v /= Complex64::new(decay, TAU * f).powi(order);
             }
         }
         let its_frfs = match unsaid.names.len() {
@@ -109,7 +110,7 @@ pub(crate) fn read(path: &Path, reading: &FrfReading, told: &mut Told) -> Result
             .into_iter()
             .map(|mut record| {
                 record.quantity.get_or_insert(reading.unsaid);
-                frf_input(&set, record)
+                frf_input(&set, record, reading.added_decay_per_s)
             })
             .collect());
     }
@@ -181,10 +182,15 @@ struct FromTaps {
     contradictory: bool,
 }
 
-fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
+fn frf_input(set: &str, record: FrfRecord, added_decay_per_s: f64) -> FrfInput {
     FrfInput {
         set: set.to_owned(),
-        receptance_m_per_n: receptance(&record.frequency_hz, &record.value, record.quantity),
+        receptance_m_per_n: receptance(
+            &record.frequency_hz,
+            &record.value,
+            record.quantity,
+            added_decay_per_s,
+        ),
         dofs: record
             .response
             .zip(record.reference)
@@ -192,7 +198,7 @@ fn frf_input(set: &str, record: FrfRecord) -> FrfInput {
         name: record.name,
         frequency_hz: record.frequency_hz,
         coherence: record.coherence,
-        added_decay_per_s: 0.0,
+        added_decay_per_s,
     }
 }
 
@@ -201,16 +207,22 @@ fn order(quantity: Option<Quantity>) -> i32 {
     quantity.map_or(0, |q| i32::from(q.derivatives()))
 }
 
-/// H = V/(iω) = A/(iω)². The 0 Hz line of a mobility or accelerance says nothing about receptance; it comes
-/// out as not finite and the analysis leaves it out anyway.
-fn receptance(frequency_hz: &[f64], value: &[Complex64], quantity: Option<Quantity>) -> Vec<Complex64> {
+/// H = V/p = A/p², p = iω; under an exponential window e^(−at) the FRF is that at p = a + iω (the shift of the Laplace transform). The
+/// 0 Hz line of a mobility or accelerance says nothing about receptance; without a window it comes out as not finite and the analysis
+/// leaves it out anyway.
+fn receptance(
+    frequency_hz: &[f64],
+    value: &[Complex64],
+    quantity: Option<Quantity>,
+    added_decay_per_s: f64,
+) -> Vec<Complex64> {
     let order = order(quantity);
     if order == 0 {
         return value.to_vec();
     }
     let lines = frequency_hz.iter().zip(value);
     lines
-        .map(|(f, v)| v / Complex64::new(0.0, TAU * f).powi(order))
+        .map(|(f, v)| v / Complex64::new(added_decay_per_s, TAU * f).powi(order))
         .collect()
 }
 
@@ -430,7 +442,12 @@ fn from_taps(
             name: format!("{}/{}", channel.name, hammer.name),
             set: set.to_owned(),
             dofs: None,
-            receptance_m_per_n: receptance(&found.frequency_hz, &found.frf[k], Some(*quantity)),
+            receptance_m_per_n: receptance(
+                &found.frequency_hz,
+                &found.frf[k],
+                Some(*quantity),
+                found.added_decay_per_s,
+            ),
             frequency_hz: found.frequency_hz.clone(),
             coherence: found.coherence.as_ref().map(|c| c[k].clone()),
             added_decay_per_s: found.added_decay_per_s,
@@ -657,7 +674,7 @@ mod tests {
     fn accelerance_and_mobility_become_receptance() {
         let f = 10.0;
         let omega = TAU * f;
-        let of = |value: Complex64, quantity| receptance(&[f], &[value], quantity)[0].re;
+        let of = |value: Complex64, quantity| receptance(&[f], &[value], quantity, 0.0)[0].re;
         let a = of(
             Complex64::new(-omega * omega * 2e-6, 0.0),
             Some(Quantity::Accelerance),

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 pub use crate::analysis::modes::frf_inputs::FrfReading;
 use crate::analysis::modes::frf_inputs::{Told, read, settle_unsaid};
 pub use crate::analysis::modes::mode_set::{AnalysedFrf, FrfInput, SetModes};
-use crate::analysis::modes::mode_set::{analyse_set, dofs_of_frfs, set_warnings};
+use crate::analysis::modes::mode_set::{analyse_set, set_warnings};
 use crate::analysis::workbench::Workbench;
 use crate::campaign::{Campaign, MeasuredDof, Point};
 use crate::ingest::is_no_measurement;
@@ -103,14 +103,7 @@ impl ModalAnalysis {
                 told.warnings.push(format!("{}: {why}", file.display()));
                 continue;
             }
-            let before = told.hits.len();
-            let mut of_file = read(file, &reading, &mut told)?;
-            // A raw record has its window from here, not from the analyser.
-            if reading.added_decay_per_s > 0.0 && told.hits.len() == before {
-                let decay = reading.added_decay_per_s;
-                of_file.iter_mut().for_each(|i| i.added_decay_per_s = decay);
-            }
-            inputs.extend(of_file);
+            inputs.extend(read(file, &reading, &mut told)?);
         }
         settle_unsaid(&mut inputs, &reading, &mut told);
         let refused = told.refused.into_iter().next();
@@ -164,8 +157,7 @@ impl ModalAnalysis {
     /// A pole that is nowhere near, in any set.
     pub fn choose(&mut self, choice: &Choice) -> Result<()> {
         for set in &mut self.sets {
-            let dofs = dofs_of_frfs(set);
-            choice.apply(&mut set.global, &dofs).map_err(|why| {
+            set.choose(choice).map_err(|why| {
                 InputError::new(format!("{}: {why}", set.set))
                     .remedy("look at the poles of the stabilisation diagram (--report, or --json)")
             })?;

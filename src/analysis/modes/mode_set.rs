@@ -7,10 +7,11 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use crate::Result;
+use crate::modal::chosen::Choice;
 use crate::modal::delay::{self, Delay};
 use crate::modal::low_end;
 use crate::modal::quality::{self, Quality, QualityGrade};
-use crate::modal::{self, FrfModes, GlobalModes, SetMember, Settings};
+use crate::modal::{self, FrfModes, GlobalModes, RejectedMode, SetMember, Settings};
 
 /// One FRF to analyse.
 #[derive(Debug, Clone)]
@@ -57,6 +58,34 @@ pub struct SetModes {
     pub verdict: QualityGrade,
     /// The verdict in words.
     pub why: String,
+}
+
+impl SetModes {
+    /// Makes the modes what the analyst wants, and judges the set by what these leave.
+    ///
+    /// # Errors
+    /// In words: those of [`Choice::apply`].
+    pub(crate) fn choose(&mut self, choice: &Choice) -> std::result::Result<(), String> {
+        if choice.is_empty() {
+            return Ok(());
+        }
+        let dofs = dofs_of_frfs(self);
+        choice.apply(&mut self.global, &dofs)?;
+        // What was said of the FRFs before holds no more.
+        let before = quality::of_set(&self.frfs.iter().map(|f| &f.quality).collect::<Vec<_>>()).1;
+        let quality = &mut self.global.quality;
+        quality.reasons.retain(|reason| *reason != before);
+        if quality.reasons.is_empty() {
+            quality.verdict = QualityGrade::Good;
+        }
+        let inputs: Vec<&FrfInput> = self.frfs.iter().map(|f| &f.input).collect();
+        let (qualities, verdict, why) = judge(&inputs, &mut self.global);
+        for (frf, quality) in self.frfs.iter_mut().zip(qualities) {
+            frf.quality = quality;
+        }
+        (self.verdict, self.why) = (verdict, why);
+        Ok(())
+    }
 }
 
 /// Response and reference of each FRF as numbers of [`SetModes::dofs`].
@@ -148,6 +177,120 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         ));
     }
     global.sine_lines = sines;
+    let (qualities, verdict, why) = judge(&inputs.iter().collect::<Vec<_>>(), &mut global);
+    // A record's window is the same for all its FRFs.
+    let added = inputs.iter().map(|i| i.added_decay_per_s).fold(0.0, f64::max);
+    for mode in &mut global.modes {
+        [mode.frequency_hz, mode.damping_ratio] =
+            without_window(mode.frequency_hz, mode.damping_ratio, added);
+    }
+    let step_hz = inputs
+        .iter()
+        .map(|i| line_step_hz(&i.frequency_hz))
+        .fold(f64::INFINITY, f64::min);
+    let against: Vec<Option<String>> = global
+        .modes
+        .iter()
+        .map(|mode| {
+            let hum = modal::undamped_hum(mode.frequency_hz, mode.damping_ratio, step_hz);
+            let undamped = mode.damping_ratio <= 0.0;
+            hum.map(|hum| format!("{hum}: a sine that does not die away"))
+                .or_else(|| undamped.then(|| "no damping is left when the window's is taken out".to_owned()))
+        })
+        .collect();
+    leave_out(&mut global, &against);
+    let frfs = inputs
+        .into_iter()
+        .zip(single)
+        .zip(qualities)
+        .map(|((input, mut modes), quality)| {
+            for mode in &mut modes.modes {
+                for e in &mut mode.estimates {
+                    let added = input.added_decay_per_s;
+                    [e.frequency_hz, e.damping_ratio] =
+                        without_window(e.frequency_hz, e.damping_ratio, added);
+                }
+                mode.estimates.retain(|e| e.damping_ratio > 0.0);
+            }
+            modes.modes.retain(|m| !m.estimates.is_empty());
+            modes.leave_out_unknown_errors();
+            AnalysedFrf {
+                input,
+                modes,
+                quality,
+            }
+        })
+        .collect();
+    Ok(SetModes {
+        set,
+        frfs,
+        dofs,
+        global,
+        verdict,
+        why,
+    })
+}
+
+/// Median distance of neighbouring lines, Hz; infinite without two.
+fn line_step_hz(frequency_hz: &[f64]) -> f64 {
+    let steps: Vec<f64> = frequency_hz.windows(2).map(|w| w[1] - w[0]).collect();
+    match steps.is_empty() {
+        true => f64::INFINITY,
+        false => crate::signal::median(&steps),
+    }
+}
+
+/// Moves modes to those that are rejected, for the reasons given mode by mode, and tells it.
+fn leave_out(global: &mut GlobalModes, why: &[Option<String>]) {
+    let stays = |k: usize| why[k].is_none();
+    let keep = |row: &[f64]| {
+        (0..row.len())
+            .filter(|k| stays(*k))
+            .map(|k| row[k])
+            .collect::<Vec<f64>>()
+    };
+    if global.mac.len() == why.len() {
+        let rows = global.mac.iter().enumerate().filter(|(k, _)| stays(*k));
+        global.mac = rows.map(|(_, row)| keep(row)).collect();
+    }
+    let (modes, mut told) = (std::mem::take(&mut global.modes), Vec::new());
+    for (mode, why) in modes.into_iter().zip(why) {
+        match why {
+            None => global.modes.push(mode),
+            Some(reason) => {
+                told.push(format!("{:.2} Hz ({reason})", mode.frequency_hz));
+                global.rejected.push(RejectedMode {
+                    frequency_hz: mode.frequency_hz,
+                    damping_ratio: mode.damping_ratio,
+                    reason: reason.clone(),
+                });
+            }
+        }
+    }
+    if !told.is_empty() {
+        global
+            .rejected
+            .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        global.warnings.push(format!("left out: {}", told.join(", ")));
+    }
+}
+
+/// Frequency (Hz) and damping ratio of the pole that lies left of the real axis by `added_decay_per_s` less: the frequency at which it
+/// swings stays, |λ| does not. A damping ratio of zero and less: the window made it.
+fn without_window(frequency_hz: f64, damping_ratio: f64, added_decay_per_s: f64) -> [f64; 2] {
+    if added_decay_per_s == 0.0 {
+        return [frequency_hz, damping_ratio];
+    }
+    let omega = TAU * frequency_hz;
+    let swing = omega * (1.0 - damping_ratio * damping_ratio).max(0.0).sqrt();
+    let decay = damping_ratio * omega - added_decay_per_s;
+    let own = swing.hypot(decay);
+    [own / TAU, decay / own]
+}
+
+/// The FRFs by what the common modes leave of them, and the verdict on the set with its words: the worse of its FRFs and of the common
+/// fit, whose own verdict it becomes.
+fn judge(inputs: &[&FrfInput], global: &mut GlobalModes) -> (Vec<Quality>, QualityGrade, String) {
     let mirror = |k: usize| {
         let [response, reference] = inputs[k].dofs.as_ref()?;
         if response == reference {
@@ -173,58 +316,14 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
             )
         })
         .collect();
-    let (of_frfs, why) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
-    let verdict = of_frfs.max(global.quality.verdict);
-    let why = [why].into_iter().chain(global.quality.reasons.iter().cloned());
-    let why = why.collect::<Vec<_>>().join("; ");
-    // A record's window is the same for all its FRFs.
-    let added = inputs.iter().map(|i| i.added_decay_per_s).fold(0.0, f64::max);
-    let mut lost = Vec::new();
-    if added > 0.0 {
-        let without = |f: f64, zeta: f64| zeta - added / (TAU * f);
-        global.modes.retain_mut(|mode| {
-            mode.damping_ratio = without(mode.frequency_hz, mode.damping_ratio);
-            let left = mode.damping_ratio > 0.0;
-            if !left {
-                lost.push(format!("{:.2} Hz", mode.frequency_hz));
-            }
-            left
-        });
-        if !lost.is_empty() {
-            global.warnings.push(format!(
-                "no damping is left when the window's is taken out (left out): {}",
-                lost.join(", ")
-            ));
-        }
+    let (of_frfs, of_frfs_in_words) = quality::of_set(&qualities.iter().collect::<Vec<_>>());
+    let reasons = global.quality.reasons.iter().cloned();
+    let why: Vec<String> = std::iter::once(of_frfs_in_words.clone()).chain(reasons).collect();
+    if of_frfs > global.quality.verdict {
+        global.quality.verdict = of_frfs;
+        global.quality.reasons.insert(0, of_frfs_in_words);
     }
-    let frfs = inputs
-        .into_iter()
-        .zip(single)
-        .zip(qualities)
-        .map(|((input, mut modes), quality)| {
-            for mode in &mut modes.modes {
-                for e in &mut mode.estimates {
-                    e.damping_ratio -= input.added_decay_per_s / (TAU * e.frequency_hz);
-                }
-                mode.estimates.retain(|e| e.damping_ratio > 0.0);
-            }
-            modes.modes.retain(|m| !m.estimates.is_empty());
-            modes.leave_out_unknown_errors();
-            AnalysedFrf {
-                input,
-                modes,
-                quality,
-            }
-        })
-        .collect();
-    Ok(SetModes {
-        set,
-        frfs,
-        dofs,
-        global,
-        verdict,
-        why,
-    })
+    (qualities, global.quality.verdict, why.join("; "))
 }
 
 /// The FRFs whose lines end well before those of the others, within the band that is looked at (Hz), in words.
@@ -364,6 +463,8 @@ pub(crate) fn set_warnings(set: &SetModes) -> Vec<String> {
 
 /// By FRF: its response (its name where that is not known), and how late it is against the force.
 fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
+    // A pole beside its place turns the constant by as many of its half-widths.
+    let scatter = set.global.quality.frequency_scatter.unwrap_or(0.0);
     let own = set.frfs.iter().enumerate();
     own.map(|(k, frf)| {
         let modes: Vec<(f64, Complex64, f64)> = set
@@ -372,6 +473,7 @@ fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
             .iter()
             .filter_map(|m| {
                 let (constant, std) = (*m.constants.get(k)?)?;
+                let std = std.hypot(constant.norm() * scatter / m.damping_ratio);
                 Some((m.frequency_hz, constant, std))
             })
             .collect();
@@ -384,6 +486,20 @@ fn delays(set: &SetModes) -> Vec<(String, Option<Delay>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_pole_without_the_window_is_the_own_one() {
+        let (omega, zeta, decay): (f64, f64, f64) = (TAU * 11.263, 0.02, 1.0 / 0.3);
+        let own = Complex64::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt());
+        let windowed = own - decay;
+        let [f, found] = without_window(windowed.norm() / TAU, -windowed.re / windowed.norm(), decay);
+        assert!(
+            (f / 11.263 - 1.0).abs() < 1e-12 && (found / zeta - 1.0).abs() < 1e-10,
+            "{f} {found}"
+        );
+        assert_eq!(without_window(10.0, 0.01, 0.0), [10.0, 0.01]);
+        assert!(without_window(10.0, 0.01, 1.0)[1] < 0.0);
+    }
 
     #[test]
     fn frfs_with_a_shorter_band_are_named() {

@@ -567,7 +567,10 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
         _ => {
             let guess = d
                 .best_guess_in_words()
-                .map_or(String::new(), |words| wrapped(&words, "  "));
+                .into_iter()
+                .chain(d.slips_in_words())
+                .map(|words| wrapped(&words, "  "))
+                .collect::<String>();
             let why = d
                 .apart_from_files()
                 .unwrap_or("what is left is real, but no effect of the library explains it");

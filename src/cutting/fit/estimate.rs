@@ -87,7 +87,8 @@ fn least_squares(
         RegressionMethod::LeastSquares,
     )?;
     let held = conic.active.contains(&true);
-    let errors = held.then(|| fit(&without(observations, &conic.active))).flatten();
+    let kept = without(observations, &conic.active);
+    let errors = held.then(|| fit(&kept)).flatten().map(|f| f.covering(&kept));
     let errors = errors.as_ref().unwrap_or(free);
     Ok(CoefficientEstimate {
         std_error: spread_out(&errors.std_error, &conic.active),

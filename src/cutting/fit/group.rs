@@ -155,7 +155,8 @@ impl ForceGroup {
         options: CfcOptions,
     ) -> Result<Option<ForceGroup>> {
         let observations = observations(cuts, rows);
-        let (Some(first), Some(free)) = (cuts.first(), fit(&observations)) else {
+        let free = fit(&observations).map(|f| f.covering(&observations));
+        let (Some(first), Some(free)) = (cuts.first(), free) else {
             return Ok(None);
         };
         let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);

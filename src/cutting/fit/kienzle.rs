@@ -149,7 +149,7 @@ fn fit_both(
         components: names.len(),
         reference_mm: (chips().sum::<f64>() / chips().count().max(1) as f64).exp(),
     };
-    let best = STARTS
+    let mut best = STARTS
         .iter()
         .filter_map(|m| law.fit(observations, law.start(observations, *m)?, 50))
         .min_by(|a, b| {
@@ -167,6 +167,15 @@ fn fit_both(
         (false, true) => Some(Preferred::LinearEdge),
         _ => None,
     };
+    let linearised: Vec<Observation> = observations
+        .iter()
+        .zip(&terms)
+        .map(|(o, terms)| Observation {
+            row: law.jacobian(terms, &best.theta),
+            ..o.clone()
+        })
+        .collect();
+    best.linear = best.linear.covering(&linearised);
     let fitted: Vec<f64> = terms.iter().map(|t| law.predict(t, &best.theta)).collect();
     let as_one: Vec<Observation> = observations
         .iter()

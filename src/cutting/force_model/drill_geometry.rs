@@ -2,7 +2,7 @@
 
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::data::{CutGeometry, Tool};
-use crate::{Error, Result};
+use crate::{Error, InputError, Result};
 
 /// A drill in a hole: lengths of docs/physics.md, "Cutting forces", mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,13 +45,18 @@ impl DrillGeometry {
     pub fn new(tool: &Tool, geometry: &CutGeometry) -> Result<DrillGeometry> {
         let [feed_per_rev_mm, pilot_diameter_mm] = feed_and_pilot_mm(geometry)?;
         let half_point_deg = tool.half_point_angle_deg.ok_or_else(|| {
-            Error::computation("drilling needs [tool] half_point_angle_deg, which is not given")
+            InputError::new("drilling needs half the point angle, which is not given")
+                .key("tool.half_point_angle_deg")
+                .remedy("add half_point_angle_deg to [tool]: 59.0 for a drill with a point angle of 118°")
         })?;
         let inner_radius_mm = if pilot_diameter_mm > 0.0 {
             0.5 * pilot_diameter_mm
         } else {
             let web = tool.web_thickness_mm.ok_or_else(|| {
-                Error::computation("a hole without pilot needs [tool] web_thickness_mm, which is not given")
+                InputError::new("a hole without pilot needs the web thickness, which is not given")
+                    .key("tool.web_thickness_mm")
+                    .remedy("add web_thickness_mm to [tool], measured at the point (about 0.15 of the diameter); a pilot hole goes into \
+                             pilot_diameter_mm of its [[cut]]")
             })?;
             chisel_half_length_mm(tool, web)
         };

@@ -531,9 +531,14 @@ fn teeth_notice<S: Sample>(
             notices.push(Notice {
                 kind: OTHER_TEETH,
                 detail: format!(
-                    "the part of the force that comes back once per turn is {} N, by the list {} N",
+                    "the part of the force that comes back once per turn is {} N, by the list {} N{}",
                     figures(other.measured, 2),
-                    figures(other.listed, 2)
+                    figures(other.listed, 2),
+                    if other.is_reversed {
+                        "; counted the other way round, its teeth agree: list them in the order in which they cut"
+                    } else {
+                        ""
+                    }
                 ),
             });
         }

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::cutting::waveform::{MillingCut, UnitForces};
+use crate::cutting::waveform::{MillingCut, ToothPlace, UnitForces};
 
 /// Part of a missing tooth's unevenness that is worth a notice: runout that lets every tooth cut stays below it.
 const TOLD: f64 = 0.7;
@@ -235,6 +235,8 @@ pub(crate) fn tooth_back_mm(
 pub(crate) struct AgainstList {
     pub measured: f64,
     pub listed: f64,
+    /// The same list read the other way round agrees.
+    pub is_reversed: bool,
 }
 
 /// Parts of the power of both by which they differ: another list, not another metal or edge.
@@ -243,8 +245,19 @@ const OTHER_TEETH: f64 = 0.5;
 const LESS: f64 = 0.4;
 /// Amplitude against the strongest line below which the teeth differ too little to speak of.
 const LITTLE: f64 = 0.15;
+/// Part of the power of the difference that is left by a list read the other way round where that is how the teeth follow one another.
+const REVERSED: f64 = 0.1;
 /// Turns of the tool that are tried for each of its orders.
 const TURNS_TRIED: usize = 16;
+
+/// Powers over some orders of the turn, N².
+#[derive(Default)]
+struct Powers {
+    measured: f64,
+    by_list: f64,
+    difference: f64,
+    noise: f64,
+}
 
 /// Do the teeth cut otherwise than the tool's list of pitches and radii has it? `orders`: from 1 on, of the forces in tool axes x and y,
 /// N, and their `std`. What an offset of the tool's axis makes is left out where it can be told apart (four teeth and more).
@@ -260,9 +273,42 @@ pub(crate) fn other_than_listed(
     if cut.places.is_empty() || teeth < 2 || count < teeth || std.iter().any(|s| s.len() < count) {
         return None;
     }
-    let unit = cut.linear(count);
     let single = single_tooth(cut).closed_form(teeth);
-    let (k_t, k_r) = direction(&single, teeth as f64, orders, mean, zero_is_known)?;
+    let coefficients = direction(&single, teeth as f64, orders, mean, zero_is_known)?;
+    let once_per_turn = |k: usize| !k.is_multiple_of(teeth);
+    let beyond_runout = |k: usize| match k % teeth {
+        0 => false,
+        rest => teeth < 4 || (rest != 1 && rest != teeth - 1),
+    };
+    let strongest = (1..=count).map(|k| power_of(orders, k)).fold(0.0, f64::max);
+    let counts =
+        |p: &Powers| p.difference > LITTLE * LITTLE * strongest && p.difference > CERTAIN * CERTAIN * p.noise;
+    let [all, beyond] = powers_by_list(cut, coefficients, orders, std, [&once_per_turn, &beyond_runout]);
+    let other = beyond.difference > OTHER_TEETH * (beyond.measured + beyond.by_list) && counts(&beyond);
+    let less = all.measured < LESS * all.by_list && counts(&all);
+    let is_reversed = counts(&all) && {
+        let mut reversed = cut.clone();
+        reversed.places = ToothPlace::reversed(&cut.places);
+        let [of_reversed] = powers_by_list(&reversed, coefficients, orders, std, [&once_per_turn]);
+        of_reversed.difference < REVERSED * all.difference
+    };
+    (other || less || is_reversed).then_some(AgainstList {
+        measured: all.measured.sqrt(),
+        listed: all.by_list.sqrt(),
+        is_reversed,
+    })
+}
+
+/// What `cut`'s list of teeth and two `coefficients` (tangential, radial) make of each of the groups of orders.
+fn powers_by_list<const N: usize>(
+    cut: &MillingCut,
+    (k_t, k_r): (f64, f64),
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    groups: [&dyn Fn(usize) -> bool; N],
+) -> [Powers; N] {
+    let count = orders[0].len().min(orders[1].len());
+    let unit = cut.linear(count);
     let listed = |axis: usize, k: usize| unit[0][axis][k] * k_t + unit[1][axis][k] * k_r;
     let both = || (0..2).flat_map(|axis| (1..=count).map(move |k| (axis, k)));
     // The tool may stand anywhere when the record begins.
@@ -275,32 +321,18 @@ pub(crate) fn other_than_listed(
     };
     let turn = (0..tried)
         .map(|step| TAU * step as f64 / tried as f64)
-        .max_by(|a, b| alike(*a).total_cmp(&alike(*b)))?;
-    let of_the_turn = |k: usize| match k % teeth {
-        0 => false,
-        rest => teeth < 4 || (rest != 1 && rest != teeth - 1),
-    };
-    // Power measured, by the list, of their difference, and of the noise.
-    let sums = |which: &dyn Fn(usize) -> bool| {
-        let mut sums = [0.0; 4];
+        .max_by(|a, b| alike(*a).total_cmp(&alike(*b)))
+        .unwrap_or(0.0);
+    groups.map(|which| {
+        let mut powers = Powers::default();
         for (axis, k) in both().filter(|(_, k)| which(*k)) {
             let (own, by_list) = (orders[axis][k - 1], listed(axis, k) * turned(turn, k));
-            let powers = [own.norm_sqr(), by_list.norm_sqr(), (own - by_list).norm_sqr()];
-            sums.iter_mut().zip(powers).for_each(|(sum, power)| *sum += power);
-            sums[3] += std[axis][k - 1].powi(2);
+            powers.measured += own.norm_sqr();
+            powers.by_list += by_list.norm_sqr();
+            powers.difference += (own - by_list).norm_sqr();
+            powers.noise += std[axis][k - 1].powi(2);
         }
-        sums
-    };
-    let strongest = (1..=count).map(|k| power_of(orders, k)).fold(0.0, f64::max);
-    let counts =
-        |apart: f64, noise: f64| apart > LITTLE * LITTLE * strongest && apart > CERTAIN * CERTAIN * noise;
-    let [own, by_list, apart, noise] = sums(&of_the_turn);
-    let [all, all_by_list, all_apart, all_noise] = sums(&|k| !k.is_multiple_of(teeth));
-    let other = apart > OTHER_TEETH * (own + by_list) && counts(apart, noise);
-    let less = all < LESS * all_by_list && counts(all_apart, all_noise);
-    (other || less).then_some(AgainstList {
-        measured: all.sqrt(),
-        listed: all_by_list.sqrt(),
+        powers
     })
 }
 
@@ -398,6 +430,9 @@ mod tests {
             (two, two, false),
             // An offset of the axis besides is no fault of the list.
             ([0.01, -2.0, -0.01, 0.0], one, false),
+            // Three radii, counted the way the tool turns and the other way; told apart by their first order alone.
+            ([0.0, 0.03, 0.02, -0.02], [0.0, 0.03, 0.02, -0.02], false),
+            ([0.0, -0.02, 0.02, 0.03], [0.0, 0.03, 0.02, -0.02], true),
         ] {
             let unit = with(truth).own_teeth(8, None, TeethSlopes::None).unit;
             // A tool that stands 50° on, 1900 and 700 N/mm² and edges of 20 and 25 N/mm.

@@ -51,6 +51,21 @@ impl ToothPlace {
         }
         places
     }
+
+    /// The same teeth where they follow one another the other way round.
+    pub(crate) fn reversed(places: &[ToothPlace]) -> Vec<ToothPlace> {
+        let mut places: Vec<ToothPlace> = places
+            .iter()
+            .map(|place| ToothPlace {
+                ahead_rad: (TAU - place.ahead_rad) % TAU,
+                ..*place
+            })
+            .collect();
+        if let Some((_, others)) = places.split_first_mut() {
+            others.reverse();
+        }
+        places
+    }
 }
 
 #[cfg(test)]

@@ -104,6 +104,9 @@ pub trait Mistake: Distortion {
     /// Selections of FRFs that it may concern.
     fn groups(&self, data: &FrfData) -> Vec<FrfGroup>;
 
+    /// Makes of what a linear estimate gives what large mistakes really are; small ones stay.
+    fn beyond_the_first_order(&self, _values: &mut [f64]) {}
+
     /// The finding, its confidence still open.
     fn finding(&self, estimated: &Estimated) -> SetupFinding;
 }

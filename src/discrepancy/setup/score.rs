@@ -209,14 +209,16 @@ impl<'a> Linearised<'a> {
             let absorbed = self.information.solve(&cross);
             let own = own - cross.transpose() * &absorbed;
             let gradient = gradient - absorbed.transpose() * &self.gradient;
-            let values = -own.cholesky()?.solve(&gradient);
+            let mut values = -own.cholesky()?.solve(&gradient);
             // A size that would have to be negative where that cannot be promises nothing.
             if k == 1 && values[0] < sizes[0].bounds[0] {
                 return None;
             }
+            let gain = -values.dot(&gradient);
+            mistake.beyond_the_first_order(values.as_mut_slice());
             Some(Score {
                 group,
-                gain: -values.dot(&gradient),
+                gain,
                 values: values.iter().copied().collect(),
             })
         });

@@ -232,6 +232,49 @@ fn wrong_readings_are_found() {
     assert!(found.place.starts_with("posture b"), "{found:?}");
 }
 
+/// Angles that the controller counts otherwise, and files in millimetres.
+#[test]
+fn other_conventions_and_units_are_found() {
+    let model = model();
+    let data = measured(&model, None, 5);
+    let filed = |turn: &dyn Fn(&[f64]) -> f64| {
+        let mut data = data.clone();
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            let angles_rad = block.kinematics.joint_angles_rad(&model.robot.spec);
+            block.kinematics = block.kinematics.turned(3, turn(&angles_rad));
+        }
+        check(&model, &data)
+            .likely()
+            .cloned()
+            .expect("another convention")
+    };
+    let reversed = filed(&|q| -2.0 * q[2]);
+    assert_eq!(
+        (reversed.kind, reversed.place.as_str()),
+        ("joint-convention", "joint 3, counted the other way round")
+    );
+    let linked = filed(&|q| q[1]);
+    assert_eq!(
+        (linked.kind, linked.place.as_str()),
+        ("joint-convention", "joint 3, counted together with joint 2")
+    );
+    let zero = filed(&|_| -std::f64::consts::FRAC_PI_2);
+    assert_eq!((zero.kind, zero.value), ("encoder-offset", Some(90.0)));
+
+    let mut millimetres = data.clone();
+    for block in &mut millimetres.blocks {
+        for frf in &mut Arc::make_mut(block).frfs {
+            frf.receptance.iter_mut().for_each(|h| *h *= 1e3);
+            frf.noise_std.iter_mut().for_each(|std| *std *= 1e3);
+        }
+    }
+    let found = check(&model, &millimetres).likely().cloned().expect("a factor");
+    assert_eq!(found.kind, "channel-gain");
+    assert!((found.value.unwrap() / 1e3 - 1.0).abs() < 0.01, "{found:?}");
+    assert!(found.remedy.contains("mm called m"), "{}", found.remedy);
+}
+
 /// Hits that were off at one posture are what every laboratory has, and are taken; what is the same in all files is not.
 #[test]
 fn small_errors_take_what_differs_between_postures_and_no_more() {

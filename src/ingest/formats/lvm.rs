@@ -232,6 +232,17 @@ fn of_segment(segment: Segment, layout: &Layout, notes: &mut Notes) -> Result<Ve
         let name = segment.names.get(column).filter(|n| !n.is_empty()).cloned();
         let name = name.unwrap_or_else(|| format!("column {}", column + 1));
         let samples = numbers(&segment, column)?;
+        // A header that was written before the recording ended says less than there is; that is no fault.
+        if let Some(announced) = value("Samples", column).filter(|n| *n > samples.len() as f64) {
+            notes.about(
+                &name,
+                format!(
+                    "the header announces {} samples, {} are there: the file or the recording was cut short",
+                    announced.round(),
+                    samples.len()
+                ),
+            );
+        }
         if samples.len() < 2 {
             notes.about(&name, "less than two samples in a segment: left out");
             continue;

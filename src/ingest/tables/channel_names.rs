@@ -340,6 +340,14 @@ pub(crate) fn settle(channels: &mut [Channel], notes: &mut Notes) {
     let unit = |c: &Channel| units::parse_named(&c.file_unit).or_else(|| unit_in_name(&c.name));
     let open = |c: &Channel, role: ChannelRole| c.role == ChannelRole::Other && fits(role, unit(c));
     for (role, label) in ROLES {
+        // Elements of one cell array (`Fx{1}`, `Fx{2}`) are of several cuts, none is the force.
+        let elements = |c: &Channel| c.role == role && c.name.ends_with('}');
+        if channels.iter().filter(|c| elements(c)).count() > 1 {
+            channels
+                .iter_mut()
+                .filter(|c| elements(c))
+                .for_each(|c| c.role = ChannelRole::Other);
+        }
         if channels.iter().any(|c| c.role == role) {
             continue;
         }
@@ -355,7 +363,7 @@ pub(crate) fn settle(channels: &mut [Channel], notes: &mut Notes) {
                 let names: Vec<&str> = several.iter().map(|c| c.name.as_str()).collect();
                 notes.file(format!(
                     "{} could each be {label}: say which it is in a [[channel]] of campaign.toml (name, in_file, and cut where each \
-                     is a cut of its own)",
+                     is a cut of its own; `lobestone init FOLDER` writes them)",
                     names.join(", ")
                 ));
             }
@@ -486,6 +494,9 @@ mod tests {
         let (two, told) = roles(&["Fx_R_1", "Fx_R_2", "Fy_R_1"]);
         assert_eq!(two, [Other, Other, ForceY]);
         assert!(told.contains("Fx_R_1, Fx_R_2 could each be Fx"), "{told}");
+        let (cells, told) = roles(&["Fx{1}", "Fx{2}", "Fy"]);
+        assert_eq!(cells, [Other, Other, ForceY]);
+        assert!(told.contains("Fx{1}, Fx{2} could each be Fx"), "{told}");
         assert_eq!(roles(&["Fc [N]", "Ff [N]", "Fp [N]"]).0, [ForceZ, ForceX, ForceY]);
         assert_eq!(roles(&["Vorschubkraft", "Drehmoment"]).0, [ForceZ, TorqueZ]);
         assert_eq!(roles(&["Fc", "Acc"]).0, [Other, Other]);

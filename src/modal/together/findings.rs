@@ -312,20 +312,25 @@ pub(crate) fn collect(
     }
 }
 
-/// MAC of every two modes, from their residues in all FRFs, each as far as it is known.
+/// MAC of every two modes, of their shapes. (Over all FRFs of several references the residues of one shape differ by how strongly each
+/// reference drives it: a mode that two references have at two places would look like two.)
 pub(crate) fn mac(modes: &[GlobalMode]) -> Vec<Vec<f64>> {
-    let residues: Vec<Vec<Complex64>> = modes
+    let places = modes
+        .iter()
+        .flat_map(|m| &m.shape)
+        .map(|(place, _)| place + 1)
+        .max();
+    let shapes: Vec<Vec<Complex64>> = modes
         .iter()
         .map(|m| {
-            m.constants
-                .iter()
-                .map(|c| c.map_or(Complex64::ZERO, |(value, std)| shape::as_known(value, std)))
-                .collect()
+            let mut shape = vec![Complex64::ZERO; places.unwrap_or(0)];
+            m.shape.iter().for_each(|(place, value)| shape[*place] = *value);
+            shape
         })
         .collect();
-    residues
+    shapes
         .iter()
-        .map(|a| residues.iter().map(|b| shape::mac(a, b)).collect())
+        .map(|a| shapes.iter().map(|b| shape::mac(a, b)).collect())
         .collect()
 }
 

@@ -51,6 +51,8 @@ struct Test {
     coloured: f64,
     /// A mode's frequency is lower by up to this part of itself, drawn for each response.
     loading: f64,
+    /// All frequencies are higher by this part of themselves with the second reference.
+    another_day: f64,
     /// Sines of four times the rms of each FRF, Hz.
     hum_hz: Vec<f64>,
     /// Modes, by number, of three tenths of the size, whose phase is drawn anew for each response.
@@ -66,6 +68,7 @@ impl Test {
             noise: 0.005,
             coloured: 0.0,
             loading: 0.0,
+            another_day: 0.0,
             hum_hz: Vec::new(),
             turned: Vec::new(),
         }
@@ -103,6 +106,7 @@ impl Test {
                         let modes = self.poles.iter().zip(&moved).zip(&shapes).zip(&turn);
                         modes
                             .map(|((((_, zeta), f0), phi), turn)| {
+                                let f0 = f0 * (1.0 + self.another_day * j as f64);
                                 let (w, w0) = (TAU * f, TAU * f0);
                                 turn * phi[i] * phi[j] * f0
                                     / Complex64::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
@@ -188,6 +192,41 @@ impl Test {
                 ((nearest.damping_ratio - zeta) / nearest.damping_std).powi(2) / self.poles.len() as f64;
         }
         (found, squares.map(f64::sqrt))
+    }
+}
+
+/// Of two references measured on two days, or roving sensors that load a little, each mode is there once, and it is told that they move.
+#[test]
+fn modes_that_move_a_little_are_no_pairs() {
+    for (seed, another_day) in [(1, 1e-3), (2, 1e-3), (1, 3e-3), (2, 3e-3)] {
+        let two_days = Test {
+            responses: 20,
+            references: 2,
+            noise: 0.01,
+            another_day,
+            ..Test::of(&SEVEN)
+        };
+        let (found, _) = two_days.holds(seed);
+        assert_eq!(
+            found.modes.len(),
+            7,
+            "seed {seed}, {another_day}: {:?}",
+            found.rejected
+        );
+        let told = found
+            .rejected
+            .iter()
+            .filter(|r| r.reason.contains("moves from FRF to FRF"));
+        assert!(told.count() > 3, "{:?}", found.rejected);
+    }
+    for seed in 1..5 {
+        let loaded = Test {
+            responses: 24,
+            loading: 1e-3,
+            ..Test::of(&SEVEN)
+        };
+        let (found, _) = loaded.holds(seed);
+        assert_eq!(found.modes.len(), 7, "seed {seed}: {:?}", found.rejected);
     }
 }
 

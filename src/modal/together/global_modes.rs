@@ -68,7 +68,7 @@ pub struct GlobalModes {
     pub sine_lines: Vec<SineLine>,
     /// What the modes are worth.
     pub quality: SetQuality,
-    /// MAC of every two modes, from their residues in all FRFs.
+    /// MAC of every two modes, of their shapes.
     pub mac: Vec<Vec<f64>>,
     /// Poles of all orders, and those that stayed.
     pub stabilisation: Stabilisation,

@@ -63,6 +63,8 @@ const IN_PHASE: f64 = 0.7;
 const CLEARLY: f64 = 20.0;
 /// … as long as they are nearer than this share of the sum of their half-widths, or than a line: what a moving pole may look like.
 const HARD_TO_TELL: f64 = 0.5;
+/// Two poles that leave hardly less than one that moves are one: they have four parameters more. Two modes leave many times less.
+const ONE_MODE: f64 = 1.02;
 /// A pole so many times as wide as its neighbour is the ground on which that stands …
 const GROUND: f64 = 5.0;
 /// … where it is more than so many of the neighbour's half-widths away.
@@ -71,6 +73,15 @@ const FAR_WIDTHS: f64 = 3.0;
 const SAME_SHAPE: f64 = 0.9;
 /// … and that do where two poles are at the same place.
 const ALIKE_SHAPE: f64 = 0.85;
+
+/// What a set of FRFs can tell modes apart by.
+#[derive(Clone, Copy)]
+struct Sight {
+    /// Its modes have common phases.
+    common_phase: bool,
+    /// Its shapes tell nothing.
+    one_place: bool,
+}
 
 /// Takes out what is no mode until all are.
 pub(crate) fn verified(
@@ -82,9 +93,12 @@ pub(crate) fn verified(
     for _ in 0..MAX_ROUNDS {
         let mut kept: Vec<Pole> = Vec::new();
         let mut out = false;
-        let (common, one_place) = (common_phase(&data, &groups), one_place(&data, &groups));
+        let sight = Sight {
+            common_phase: common_phase(&data, &groups),
+            one_place: one_place(&data, &groups),
+        };
         for group in &groups {
-            let pairs = close_pairs(&data, group, common, one_place);
+            let pairs = close_pairs(&data, group, sight);
             let poles = &group.solution.poles;
             let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
             let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
@@ -384,8 +398,8 @@ struct ClosePair {
 }
 
 /// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
-/// pole is in two of them. `common`: the modes of the set have common phases; `one_place`: and shapes that tell nothing.
-fn close_pairs(data: &[Data], group: &Group, common: bool, one_place: bool) -> Vec<ClosePair> {
+/// pole is in two of them.
+fn close_pairs(data: &[Data], group: &Group, sight: Sight) -> Vec<ClosePair> {
     let solution = &group.solution;
     let mut order: Vec<usize> = (0..solution.poles.len()).collect();
     order.sort_by(|&a, &b| {
@@ -396,7 +410,7 @@ fn close_pairs(data: &[Data], group: &Group, common: bool, one_place: bool) -> V
     let mut found = Vec::new();
     let mut k = 1;
     while k < order.len() {
-        match close_pair(data, solution, [order[k - 1], order[k]], common, one_place) {
+        match close_pair(data, solution, [order[k - 1], order[k]], sight) {
             Some(pair) => {
                 found.push(pair);
                 k += 2;
@@ -407,13 +421,7 @@ fn close_pairs(data: &[Data], group: &Group, common: bool, one_place: bool) -> V
     found
 }
 
-fn close_pair(
-    data: &[Data],
-    solution: &Solution,
-    both: [usize; 2],
-    common: bool,
-    one_place: bool,
-) -> Option<ClosePair> {
+fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], sight: Sight) -> Option<ClosePair> {
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
     let line_hz = joint_fit::line_hz(data, a.frequency_hz);
@@ -440,7 +448,7 @@ fn close_pair(
     let enough = solution.taking_part() >= ENOUGH_FRFS;
     // Leakage and what else one pole lacks gives two poles an edge that more FRFs would see through.
     let hard_to_tell = !enough && apart_hz < (HARD_TO_TELL * width).max(line_hz);
-    let most = if hard_to_tell { CLEARLY } else { 1.0 };
+    let most = if hard_to_tell { CLEARLY } else { ONE_MODE };
     // A narrow mode does not move as far as a broad one beside it reaches.
     let halves = [a, b].map(|p| p.damping_ratio * p.frequency_hz);
     let (narrow_hz, broad_hz) = (halves[0].min(halves[1]), halves[0].max(halves[1]));
@@ -464,7 +472,8 @@ fn close_pair(
     let same_place = apart_hz < SAME * width || leaks;
     // Two modes as near as that have common phases both, if the others of the set have.
     let cancel = enough
-        && (same_place && residues.iter().any(out_of_phase) || common && residues.iter().all(out_of_phase));
+        && (same_place && residues.iter().any(out_of_phase)
+            || sight.common_phase && residues.iter().all(out_of_phase));
     if cancel {
         return Some(ClosePair {
             strong,
@@ -474,7 +483,7 @@ fn close_pair(
         });
     }
     let alike = if same_place { ALIKE_SHAPE } else { SAME_SHAPE };
-    let clearly_two = one_place && moving.is_some_and(|m| m.leaves > CLEARLY);
+    let clearly_two = sight.one_place && moving.is_some_and(|m| m.leaves > CLEARLY);
     let repeats = enough && !clearly_two && shape::mac(&residues[0], &residues[1]) > alike;
     repeats.then(|| ClosePair {
         strong,

@@ -165,6 +165,31 @@ impl Kinematics {
         turned
     }
 
+    /// The joint angles of this posture of the robot `spec`, −π to π.
+    pub fn joint_angles_rad(&self, spec: &RobotSpec) -> Vec<f64> {
+        let frames = self.frames.windows(2).zip(&spec.joints);
+        frames
+            .map(|(w, joint)| {
+                let turned = w[0].rotation.inverse() * w[1].rotation;
+                let at_zero = joint_transform(joint, 0.0).rotation;
+                let (turn, axis) = match &joint.placement {
+                    Some(placement) => (
+                        at_zero.inverse() * turned,
+                        Vector3::from(placement.axis).normalize(),
+                    ),
+                    None => (turned * at_zero.inverse(), Vector3::z()),
+                };
+                let half = turn
+                    .quaternion()
+                    .vector()
+                    .dot(&axis)
+                    .atan2(turn.quaternion().scalar());
+                let angle = 2.0 * half;
+                angle.sin().atan2(angle.cos())
+            })
+            .collect()
+    }
+
     /// A frame at joint `i` (1-based), fixed to the link before it; z is the axis. In the Denavit–Hartenberg convention
     /// it is frame i−1.
     pub fn joint_frame(&self, i: usize) -> &Isometry3<f64> {
@@ -245,6 +270,27 @@ mod tests {
             links: Vec::new(),
             tool: ToolFrame::default(),
             guesses: Vec::new(),
+        }
+    }
+
+    /// In the Denavit–Hartenberg convention and with axes given.
+    #[test]
+    fn the_angles_of_a_posture_are_those_that_it_was_made_of() {
+        let placed = JointSpec {
+            placement: Some(JointPlacement {
+                origin_m: [0.1, -0.2, 0.3],
+                rpy_rad: [0.4, -0.3, 1.2],
+                axis: [0.0, 0.6, -0.8],
+            }),
+            ..JointSpec::default()
+        };
+        let mut spec = planar(&[0.4, 0.3]);
+        (spec.joints[0].alpha_rad, spec.joints[1].offset_rad) = (1.3, -0.9);
+        spec.joints.push(placed);
+        let q = [2.9, -1.1, 0.6];
+        let found = Kinematics::new(&spec, &q).joint_angles_rad(&spec);
+        for (found, q) in found.iter().zip(q) {
+            assert!((found - q).abs() < 1e-12, "{found} for {q}");
         }
     }
 

@@ -10,6 +10,7 @@ use super::guess;
 use super::tree::{Tree, kind, turns};
 use crate::data::{JointPlacement, JointSpec, LinkSpec, RobotSpec, ToolFrame};
 use crate::robot::kinematics::dh::{rotation_of_rpy, rpy_of_rotation};
+use crate::text::figures;
 use crate::{InputError, Result};
 
 /// What a URDF does not say.
@@ -53,11 +54,7 @@ const ROUNDING: f64 = 1e-15;
 /// impossible masses or inertias; each with file, link or joint, and remedy.
 pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
     can_be_parsed(file, text)?;
-    let robot = urdf_rs::read_from_string(text).map_err(|error| {
-        InputError::new(format!("is no URDF that can be read: {error}"))
-            .file(file)
-            .remedy("check it with check_urdf, or load it in the program that it comes from")
-    })?;
+    let robot = urdf_rs::read_from_string(text).map_err(|error| unreadable(file, text, &error))?;
     let tree = Tree::new(file, &robot)?;
     for joint in &robot.joints {
         let numbers = joint.origin.xyz.iter().chain(&*joint.origin.rpy);
@@ -93,7 +90,7 @@ pub fn read(file: &Path, text: &str, request: &Request) -> Result<UrdfRobot> {
         } else if segment.body.mass_kg > 0.0 {
             let told = format!(
                 "{} kg stand still with {base} and are left out",
-                segment.body.mass_kg
+                figures(segment.body.mass_kg, 4)
             );
             reader.notes.push(told);
         }
@@ -174,6 +171,53 @@ fn can_be_parsed(file: &Path, text: &str) -> Result<()> {
         ),
         _ => Ok(()),
     }
+}
+
+/// The parser says what it misses, not where: links and joints are read one by one until it is found.
+fn unreadable(file: &Path, text: &str, error: &urdf_rs::UrdfError) -> InputError {
+    const REMEDY: &str = "check it with check_urdf, or load it in the program that it comes from";
+    let refused = |error: &urdf_rs::UrdfError| {
+        let said = error.to_string();
+        let said = said.strip_prefix("custom: ").unwrap_or(&said);
+        InputError::new(format!("is no URDF that can be read: {said}")).file(file)
+    };
+    let mut starts: Vec<(usize, &str)> = ["link", "joint"]
+        .into_iter()
+        .flat_map(|kind| {
+            let is_tag = move |at: &usize| text[at + 1 + kind.len()..].starts_with(char::is_whitespace);
+            let found = text.match_indices('<').map(|(at, _)| at);
+            found
+                .filter(move |at| text[at + 1..].starts_with(kind) && is_tag(at))
+                .map(move |at| (at, kind))
+        })
+        .collect();
+    starts.sort_unstable();
+    for (at, kind) in starts {
+        let own = &text[at..];
+        let head = own.find('>').map_or(own.len(), |end| end + 1);
+        let end = match own[..head].ends_with("/>") {
+            true => Some(head),
+            false => own.find(&format!("</{kind}>")).map(|end| end + kind.len() + 3),
+        };
+        let Some(element) = end.map(|end| &own[..end]) else {
+            continue;
+        };
+        let Err(error) = urdf_rs::read_from_string(&format!("<robot name=\"one\">{element}</robot>")) else {
+            continue;
+        };
+        let name = own[..head].split("name=").nth(1).and_then(|rest| {
+            let quote = rest.chars().next().filter(|c| "\"'".contains(*c))?;
+            rest[1..].split(quote).next()
+        });
+        let key = name.map_or_else(|| kind.to_owned(), |name| format!("{kind} {name}"));
+        return refused(&error)
+            .line(text[..at].matches('\n').count() + 1)
+            .key(key)
+            .remedy(format!(
+                "correct this {kind}: numbers with a decimal point, and all that URDF asks for; then {REMEDY}"
+            ));
+    }
+    refused(error).remedy(REMEDY)
 }
 
 fn finite<'a>(file: &Path, key: &str, numbers: impl Iterator<Item = &'a f64>) -> Result<()> {

@@ -2,8 +2,10 @@
 
 mod axes;
 mod channel_sign;
+mod joint_convention;
 mod phase_conjugated;
 mod point_frame;
+mod point_swap;
 mod posture_swap;
 mod promising;
 mod proposal;

@@ -2,7 +2,9 @@
 
 use super::proposal::Proposed;
 use super::table::DistanceTable;
-use super::{axes, channel_sign, phase_conjugated, point_frame, posture_swap, quantity};
+use super::{
+    axes, channel_sign, joint_convention, phase_conjugated, point_frame, point_swap, posture_swap, quantity,
+};
 use crate::Result;
 use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::FrfData;
@@ -34,6 +36,8 @@ pub fn proposed(
         here.extend(phase_conjugated::proposed(&table, data));
         here.extend(quantity::proposed(&table, data));
         here.extend(point_frame::proposed(&table, model, data, theta)?);
+        here.extend(point_swap::proposed(&table, model, data, theta)?);
+        here.extend(joint_convention::proposed(&table, model, data, theta)?);
         here.extend(posture_swap::proposed(&table, model, data, theta)?);
         let disagreement: f64 = table.now.iter().sum();
         for proposed in &mut here {

@@ -73,7 +73,7 @@ pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
                 distance(lines.map(|(m, f)| m * factor(*f, power)), frf)
             })
             .collect();
-        for group in FrfGroup::postures(data) {
+        for group in FrfGroup::channels(data) {
             all.push(Proposed {
                 gain: table.gain(data, &group, |i, _| turned[i]),
                 reading: Box::new(MisreadQuantity { group, power }),

@@ -78,9 +78,30 @@ pub(crate) fn contents(
         .map(|(v, _)| v)
         .collect();
     if !left.is_empty() {
-        notes.file(format!("arrays left out: {}", names(left.into_iter())));
+        let told = left.iter().map(|v| match why_left_out(v, &contents.times) {
+            Some(why) => format!("{} ({why})", v.name),
+            None => v.name.clone(),
+        });
+        notes.file(format!("arrays left out: {}", listed(told)));
     }
     Ok(contents)
+}
+
+/// Why an array that may have been meant for a signal is none.
+fn why_left_out(variable: &Variable, times: &[TimeRecord]) -> Option<String> {
+    let samples = times.first()?.len();
+    let own = variable.size.iter().copied().max()?;
+    if variable.im.is_some() || (own as f64) < SHORT * samples as f64 {
+        return None;
+    }
+    let no_number = variable.re.iter().position(|v| !v.is_finite());
+    match no_number {
+        Some(at) => Some(format!("value {} is no number", at + 1)),
+        None if times.iter().all(|t| t.len() != own) => {
+            Some(format!("{own} values, the signals have {samples}"))
+        }
+        None => None,
+    }
 }
 
 /// Real arrays of two columns that are the real and imaginary parts of an FRF become complex.
@@ -279,10 +300,15 @@ fn record(variable: &Variable, name: String, axis: &[f64], value: Vec<Complex64>
 }
 
 fn names<'a>(variables: impl ExactSizeIterator<Item = &'a Variable>) -> String {
-    let count = variables.len();
-    let mut shown: Vec<&str> = variables.take(SHOWN).map(|v| v.name.as_str()).collect();
+    listed(variables.map(|v| v.name.clone()))
+}
+
+/// The first few, with a sign that there are more.
+fn listed(texts: impl ExactSizeIterator<Item = String>) -> String {
+    let count = texts.len();
+    let mut shown: Vec<String> = texts.take(SHOWN).collect();
     if count > SHOWN {
-        shown.push("…");
+        shown.push("…".into());
     }
     shown.join(", ")
 }
@@ -534,6 +560,8 @@ fn quantity(variable: &Variable) -> Option<Quantity> {
 
 /// Signals beside one so many times as long are none.
 const SHORT: f64 = 0.25;
+/// Two rates that differ by less are one, printed or stored with few digits.
+const RATES_AGREE: f64 = 1e-3;
 
 /// Real arrays along a time axis, or, where there is only a sampling rate, along their longest dimension.
 fn time_signals(
@@ -550,6 +578,21 @@ fn time_signals(
         .filter_map(|(k, v)| Some((k, v.says_rate_hz()?)))
         .collect();
     let rate = rates.first().copied();
+    for (at, (k, hz)) in rates.iter().enumerate() {
+        let mut before = rates[..at].iter();
+        let said = before.find(|(b, _)| variables[*b].root() == variables[*k].root());
+        if let Some((b, said)) = said.filter(|(_, said)| (said / hz - 1.0).abs() > RATES_AGREE) {
+            notes.about(
+                &variables[*k].name,
+                format!(
+                    "says {} samples per second, {} says {}: that is taken; find out which is right",
+                    units::figures(*hz, 6),
+                    variables[*b].name,
+                    units::figures(*said, 6)
+                ),
+            );
+        }
+    }
     // That of its own struct, where each has one.
     let rate_of = |v: &Variable| {
         let own = rates.iter().find(|(k, _)| variables[*k].root() == v.root());
@@ -579,7 +622,18 @@ fn time_signals(
         // The rate is exact where the axis was stored in single precision.
         let said = rate
             .map(|(_, r)| 1.0 / r)
-            .filter(|s| (s / own - 1.0).abs() < 1e-3);
+            .filter(|s| (s / own - 1.0).abs() < RATES_AGREE);
+        if let (Some((k, hz)), None) = (rate, said) {
+            notes.about(
+                &variables[k].name,
+                format!(
+                    "says {} samples per second, the times {} say {}: the times are taken",
+                    units::figures(hz, 6),
+                    axis.name,
+                    units::figures(1.0 / own, 6)
+                ),
+            );
+        }
         let step = said.unwrap_or(own);
         // Times summed up in single precision drift off the grid, but every step is one.
         let even = |w: &[f64]| ((w[1] - w[0]) / step - 1.0).abs() < UNEVEN;

@@ -69,6 +69,38 @@ fn an_array_of_coherences_goes_to_the_array_of_frfs_that_is_as_large() {
 }
 
 #[test]
+fn rates_that_contradict_and_arrays_that_do_not_fit_are_told() {
+    let mut spoilt = count(40);
+    spoilt[6] = f64::NAN;
+    let all = vec![
+        real("fs", &[1, 1], vec![5000.0]),
+        real("dt", &[1, 1], vec![1e-4]),
+        real("Fx", &[40, 1], count(40)),
+        real("Fy", &[40, 1], spoilt),
+        real("Fz", &[38, 1], count(38)),
+        real("tool", &[3, 1], count(3)),
+    ];
+    let (contents, warnings) = found(all.clone());
+    assert_eq!(contents.times[0].sample_rate_hz, 5000.0);
+    let told = |part: &str| warnings.iter().any(|w| w.contains(part));
+    assert!(
+        told("dt: says 10000.0 samples per second, fs says 5000.00: that is taken"),
+        "{warnings:?}"
+    );
+    assert!(told("Fy (value 7 is no number)"), "{warnings:?}");
+    let mut with_times = all;
+    with_times[1] = real("t", &[40, 1], count(40).iter().map(|k| k * 1e-4).collect());
+    let (contents, warnings) = found(with_times);
+    assert!((contents.times[0].sample_rate_hz - 1e4).abs() < 1e-6);
+    let told = |part: &str| warnings.iter().any(|w| w.contains(part));
+    assert!(
+        told("fs: says 5000.00 samples per second, the times t say 10000.0"),
+        "{warnings:?}"
+    );
+    assert!(told("Fz (38 values, the signals have 40), tool"), "{warnings:?}");
+}
+
+#[test]
 fn signals_are_real_arrays_along_the_times_or_at_a_rate() {
     let t: Vec<f64> = count(8).iter().map(|k| f64::from((0.1 * k) as f32)).collect();
     let all = vec![

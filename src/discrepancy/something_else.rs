@@ -113,7 +113,7 @@ pub fn odds_against_slips(rest: &Rest) -> f64 {
 /// Prior odds of something too faint to be seen beyond doubt against nothing, however much data there is.
 const FAINT_ODDS: f64 = 0.2;
 /// Prior odds of something that matters against nothing.
-const HIDDEN_ODDS: f64 = 2.0;
+const HIDDEN_ODDS: f64 = 1.0;
 /// Sizes that matter, as shares of the noise's χ²: each power of ten between them as likely.
 const SIZES_THAT_MATTER: [f64; 2] = [1e-3, 0.3];
 /// Standard deviations by which something has to stand out to be found among many candidates.
@@ -297,7 +297,7 @@ mod tests {
         assert!(odds(1e-5, 0.0) > 20.0 && odds(1.0, 1e6) > 20.0);
         // Of 3,600 values six standard deviations are a hundredth: 40 % of the sizes that matter stay below it.
         let few = odds_of_something_faint(evidence_of_chance(1.0), 0.0, 3600.0);
-        assert!((few / odds(1.0, 0.0) - (0.2 + 2.0 * 10.0_f64.ln() / 300.0_f64.ln()) / 0.2).abs() < 1e-9);
+        assert!((few / odds(1.0, 0.0) - (0.2 + 10.0_f64.ln() / 300.0_f64.ln()) / 0.2).abs() < 1e-9);
         assert_eq!(
             odds_of_something_faint(1.0, 1.0, 36e3),
             odds_of_something_faint(1.0, 1.0, 1e9)

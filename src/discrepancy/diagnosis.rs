@@ -1,7 +1,7 @@
 //! What the loop answers: the verdict, how sure it is, and the candidates that it rests on.
 
 use super::candidate::{BaselineFit, EffectCandidate};
-use super::verdict::{DiagnosisVerdict, leaves_noise};
+use super::verdict::{DiagnosisVerdict, is_noise, leaves_noise};
 use crate::identify::Modelled;
 
 /// The answer.
@@ -40,7 +40,9 @@ impl<D: Modelled> Diagnosis<D> {
 
     /// The model as it stands leaves noise, and the verdict is unknown for what was found among the files: why, in words.
     pub fn apart_from_files(&self) -> Option<&'static str> {
+        // Where there are few lines its structure need not show.
         let only_files = self.verdict == DiagnosisVerdict::Unknown
+            && is_noise(self.baseline.reduced_chi2)
             && leaves_noise(&self.baseline.rest, self.baseline.reduced_chi2);
         only_files.then_some(
             "what was found among the files is no effect of the library; apart from it what is left looks like noise",

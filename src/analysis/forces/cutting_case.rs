@@ -110,7 +110,7 @@ impl CuttingData {
                 }
                 Err(error) => {
                     warnings.push(format!("cut {} is left out: {error}", campaign.cuts[i].id));
-                    first_error.get_or_insert(error.clone());
+                    first_error.get_or_insert_with(|| error.clone());
                 }
             }
         }

@@ -10,6 +10,7 @@ use crate::Result;
 use crate::modal::chosen::Choice;
 use crate::modal::delay::{self, Delay};
 use crate::modal::low_end;
+use crate::modal::max_likelihood::joint_fit;
 use crate::modal::quality::{self, Quality, QualityGrade};
 use crate::modal::{self, FrfModes, GlobalModes, RejectedMode, SetMember, Settings};
 
@@ -184,15 +185,17 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         [mode.frequency_hz, mode.damping_ratio] =
             without_window(mode.frequency_hz, mode.damping_ratio, added);
     }
-    let step_hz = inputs
-        .iter()
-        .map(|i| line_step_hz(&i.frequency_hz))
-        .fold(f64::INFINITY, f64::min);
+    let step_hz = |at_hz: f64| {
+        let steps = inputs
+            .iter()
+            .map(|i| joint_fit::spacing_hz(&i.frequency_hz, at_hz));
+        steps.fold(f64::INFINITY, f64::min)
+    };
     let against: Vec<Option<String>> = global
         .modes
         .iter()
         .map(|mode| {
-            let hum = modal::undamped_hum(mode.frequency_hz, mode.damping_ratio, step_hz);
+            let hum = modal::undamped_hum(mode.frequency_hz, mode.damping_ratio, step_hz(mode.frequency_hz));
             let undamped = mode.damping_ratio <= 0.0;
             hum.map(|hum| format!("{hum}: a sine that does not die away"))
                 .or_else(|| undamped.then(|| "no damping is left when the window's is taken out".to_owned()))
@@ -229,15 +232,6 @@ pub(crate) fn analyse_set(set: String, inputs: Vec<FrfInput>, settings: &Setting
         verdict,
         why,
     })
-}
-
-/// Median distance of neighbouring lines, Hz; infinite without two.
-fn line_step_hz(frequency_hz: &[f64]) -> f64 {
-    let steps: Vec<f64> = frequency_hz.windows(2).map(|w| w[1] - w[0]).collect();
-    match steps.is_empty() {
-        true => f64::INFINITY,
-        false => crate::signal::median(&steps),
-    }
 }
 
 /// Moves modes to those that are rejected, for the reasons given mode by mode, and tells it.

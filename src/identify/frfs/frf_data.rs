@@ -105,6 +105,26 @@ impl FrfData {
         Ok(data)
     }
 
+    /// Where the robot's frames are at each posture; `None` where nothing was measured.
+    pub fn kinematics_by_posture(&self) -> Vec<Option<&Kinematics>> {
+        let mut all = vec![None; self.posture_ids.len()];
+        for block in &self.blocks {
+            all[block.posture] = Some(&block.kinematics);
+        }
+        all
+    }
+
+    /// The same FRFs where the robot stood as `at` has it by posture; as it is filed where that says nothing.
+    pub fn with_kinematics<'k>(&self, at: impl Fn(usize) -> Option<&'k Kinematics>) -> FrfData {
+        let mut data = self.clone();
+        for block in &mut data.blocks {
+            if let Some(kinematics) = at(block.posture) {
+                Arc::make_mut(block).kinematics = kinematics.clone();
+            }
+        }
+        data
+    }
+
     /// Groups FRFs into blocks; their noise is not known yet (`noise_std` stays empty).
     ///
     /// # Errors

@@ -1,11 +1,10 @@
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::sync::Arc;
 
 use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
 use super::proposal::Proposed;
-use super::table::{DistanceTable, distance};
+use super::table::DistanceTable;
 use crate::Result;
 use crate::data::Point;
 use crate::identify::StructureModel;
@@ -34,13 +33,7 @@ pub struct JointConvention {
 
 impl FileReading for JointConvention {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            if let Some(kinematics) = &self.kinematics[block.posture] {
-                Arc::make_mut(block).kinematics = kinematics.clone();
-            }
-        }
-        data
+        data.with_kinematics(|posture| self.kinematics[posture].as_ref())
     }
 
     fn finding(&self, _data: &FrfData, _points: &[Point]) -> SetupFinding {
@@ -63,18 +56,17 @@ impl FileReading for JointConvention {
                 ),
             ),
             Convention::WithTheOneBefore(times) => {
-                let (with, mend) = if times > 0.0 {
-                    ("together with", "Take angle {before} from")
-                } else {
-                    ("against", "Add angle {before} to")
+                let before = joint - 1;
+                let (with, mend) = match times > 0.0 {
+                    true => ("together with", format!("Take angle {before} from")),
+                    false => ("against", format!("Add angle {before} to")),
                 };
                 (
                     "joint-convention",
-                    format!("counted {with} joint {}", joint - 1),
+                    format!("counted {with} joint {before}"),
                     None,
                     format!(
-                        "{} {angle}: the controller counts it {with} the joint before (a parallel linkage).",
-                        mend.replace("{before}", &(joint - 1).to_string())
+                        "{mend} {angle}: the controller counts it {with} the joint before (a parallel linkage)."
                     ),
                 )
             }
@@ -107,35 +99,29 @@ pub fn proposed(
     data: &FrfData,
     theta: &[f64],
 ) -> Result<Vec<Proposed>> {
-    let mut given: Vec<Option<&Kinematics>> = vec![None; data.posture_ids.len()];
-    for block in &data.blocks {
-        given[block.posture] = Some(&block.kinematics);
-    }
+    let given = data.kinematics_by_posture();
+    let angles_rad = |kinematics: &Kinematics| kinematics.joint_angles_rad(&model.robot.spec);
+    let with_angles: Vec<Option<(&Kinematics, Vec<f64>)>> =
+        given.iter().map(|k| k.map(|k| (k, angles_rad(k)))).collect();
     let mut all = Vec::new();
     for joint in 1..=model.robot.joint_count() {
         let zeros = [FRAC_PI_2, -FRAC_PI_2, PI].map(Convention::Zero);
         let linked = [1.0, -1.0].map(Convention::WithTheOneBefore);
         let later = zeros.into_iter().chain(linked).filter(|_| joint > 1);
         for convention in std::iter::once(Convention::Reversed).chain(later) {
-            let read = |kinematics: &Kinematics| {
-                let angles_rad = kinematics.joint_angles_rad(&model.robot.spec);
-                kinematics.turned(joint, turn_rad(convention, joint, &angles_rad))
+            let read = |posture: &Option<(&Kinematics, Vec<f64>)>| {
+                let (kinematics, angles_rad) = posture.as_ref()?;
+                Some(kinematics.turned(joint, turn_rad(convention, joint, angles_rad)))
             };
             let reading = JointConvention {
                 joint,
                 convention,
-                kinematics: given.iter().map(|k| k.map(read)).collect(),
+                kinematics: with_angles.iter().map(read).collect(),
             };
             let curves = predict(model, theta, &reading.corrected(data), None)?;
-            let gain = data
-                .frfs()
-                .zip(&curves)
-                .enumerate()
-                .map(|(i, ((_, frf), curve))| table.now[i] - distance(curve.iter().copied(), frf))
-                .sum();
             all.push(Proposed {
+                gain: table.gain_by_curves(data, &curves, |_| true),
                 reading: Box::new(reading),
-                gain,
             });
         }
     }

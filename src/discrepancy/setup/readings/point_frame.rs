@@ -2,7 +2,7 @@ use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
 use super::proposal::Proposed;
-use super::table::{DistanceTable, distance};
+use super::table::DistanceTable;
 use crate::Result;
 use crate::data::{AxesRef, BodyRef, Point};
 use crate::identify::StructureModel;
@@ -120,16 +120,9 @@ pub fn proposed(
         for reading in readings {
             let read = model.with_fixed(|fixed| fixed.points = reading.points(&model.points));
             let curves = predict(&read, theta, data, None)?;
-            let gain = data
-                .frfs()
-                .zip(&curves)
-                .enumerate()
-                .filter(|(_, ((_, frf), _))| concerned(frf))
-                .map(|(i, ((_, frf), curve))| table.now[i] - distance(curve.iter().copied(), frf))
-                .sum();
             all.push(Proposed {
+                gain: table.gain_by_curves(data, &curves, concerned),
                 reading: Box::new(reading),
-                gain,
             });
         }
     }

@@ -2,7 +2,7 @@ use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
 use super::proposal::Proposed;
-use super::table::{DistanceTable, distance};
+use super::table::DistanceTable;
 use crate::Result;
 use crate::data::Point;
 use crate::identify::StructureModel;
@@ -65,16 +65,9 @@ pub fn proposed(
             let reading = PointSwap { both: [a, b] };
             let read = model.with_fixed(|fixed| fixed.points = reading.points(&model.points));
             let curves = predict(&read, theta, data, None)?;
-            let gain = data
-                .frfs()
-                .zip(&curves)
-                .enumerate()
-                .filter(|(_, ((_, frf), _))| at(frf, a) || at(frf, b))
-                .map(|(i, ((_, frf), curve))| table.now[i] - distance(curve.iter().copied(), frf))
-                .sum();
             all.push(Proposed {
+                gain: table.gain_by_curves(data, &curves, |frf| at(frf, a) || at(frf, b)),
                 reading: Box::new(reading),
-                gain,
             });
         }
     }

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
@@ -21,16 +19,10 @@ pub struct PostureSwap {
 
 impl FileReading for PostureSwap {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            let target = self.moves.iter().find(|(from, _)| *from == block.posture);
-            if let Some((_, to)) = target
-                && let Some(kinematics) = &self.kinematics[*to]
-            {
-                Arc::make_mut(block).kinematics = kinematics.clone();
-            }
-        }
-        data
+        data.with_kinematics(|posture| {
+            let (_, to) = self.moves.iter().find(|(from, _)| *from == posture)?;
+            self.kinematics[*to].as_ref()
+        })
     }
 
     fn finding(&self, data: &FrfData, _points: &[Point]) -> SetupFinding {
@@ -86,20 +78,16 @@ pub fn proposed(
     theta: &[f64],
 ) -> Result<Vec<Proposed>> {
     let postures = data.measured_postures();
-    let mut kinematics: Vec<Option<Kinematics>> = vec![None; data.posture_ids.len()];
-    for block in &data.blocks {
-        kinematics[block.posture] = Some(block.kinematics.clone());
-    }
+    let kinematics: Vec<Option<Kinematics>> = data
+        .kinematics_by_posture()
+        .into_iter()
+        .map(Option::<&_>::cloned)
+        .collect();
     let n = postures.len();
     // cost[i][j]: files of posture i under the angles of posture j.
     let mut cost = vec![vec![0.0; n]; n];
     for (j, &target) in postures.iter().enumerate() {
-        let mut other = data.clone();
-        for block in &mut other.blocks {
-            if let Some(k) = &kinematics[target] {
-                Arc::make_mut(block).kinematics = k.clone();
-            }
-        }
+        let other = data.with_kinematics(|_| kinematics[target].as_ref());
         let curves = predict(model, theta, &other, None)?;
         for (number, ((_, frf), curve)) in data.frfs().zip(&curves).enumerate() {
             let i = postures.iter().position(|p| *p == frf.posture).unwrap_or(0);

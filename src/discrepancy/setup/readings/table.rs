@@ -49,4 +49,17 @@ impl DistanceTable {
         let frfs = data.frfs().enumerate().filter(|(_, (_, f))| group.holds(f));
         frfs.map(|(i, (_, frf))| self.now[i] - distance(i, frf)).sum()
     }
+
+    /// How much nearer the FRFs that a reading concerns come with what the model then predicts: `curves` in the order of the data.
+    pub fn gain_by_curves(
+        &self,
+        data: &FrfData,
+        curves: &Curves,
+        concerns: impl Fn(&FrfDatum) -> bool,
+    ) -> f64 {
+        let frfs = data.frfs().zip(curves).enumerate();
+        frfs.filter(|(_, ((_, frf), _))| concerns(frf))
+            .map(|(i, ((_, frf), curve))| self.now[i] - distance(curve.iter().copied(), frf))
+            .sum()
+    }
 }

@@ -104,6 +104,8 @@ pub fn fit_force_coefficients(
             told.extend(warnings::of_one_feed(trials, &one.cuts, &all));
             told.extend(warnings::of_fits(&all, &by_speed));
             told.extend(warnings::of_shape(trials, &all));
+            told.extend(warnings::of_direction(trials, &all));
+            told.extend(warnings::of_uneven_teeth(&one.cuts, &all));
             told.extend(warnings::of_missed(trials, &one.cuts));
             told.extend(warnings::of_full_holes(trials, &one.cuts, &all));
             told.extend(warnings::of_methods(&all, &by_speed, options));

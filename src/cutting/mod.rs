@@ -41,6 +41,7 @@ pub(crate) use identify::none_usable;
 pub use identify::{CfcResult, fit_force_coefficients};
 #[cfg(test)]
 pub(crate) use made_tools::drill as test_drill;
+pub(crate) use measured::contact::record_at_full_contact;
 #[cfg(test)]
 pub(crate) use measured::cut_analysis::WRONG_SPEED;
 pub(crate) use measured::cut_analysis::contradicts_speed;
@@ -50,6 +51,7 @@ pub use measured::faults::repair_record;
 pub(crate) use measured::in_step::OTHER_SPEED;
 pub use measured::in_step::{RecordReading, analyse_in_step};
 pub use measured::record::analyse_cut;
+pub use measured::uneven_teeth::UnevenTeeth;
 pub(crate) use plausibility::USUAL;
 pub(crate) use warnings::of_notices;
 pub use warnings::speed_text;

@@ -12,6 +12,7 @@ use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::NO_AIR;
 use crate::cutting::measured::cut_analysis::{CutAnalysis, NOTHING_REPEATS, Notice, WRONG_SPEED};
 use crate::data::{CutGeometry, Process};
+use crate::text::figures;
 
 /// Notices of all records, one sentence a kind.
 pub(super) fn of_records(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Vec<String> {
@@ -183,6 +184,55 @@ pub(super) fn of_shape(trials: &CuttingTrials, fit: &ForceGroup) -> Option<Strin
             "Krc is {value:.0} ± {std:.0} N/mm²: no edge draws itself into the work like that. On an edge that is not straight the \
              radial force pushes the tool up; check that Fz is that of the work on the tool, away from the tip positive \
              (`tool_from_dyno` in [dynamometer])"
+        )
+    })
+}
+
+/// A dynamometer turned about the spindle's axis by some 20° to 30° puts the tangential force into the radial coefficient, and no waveform
+/// tells it: turned forces fit as well.
+pub(super) fn of_direction(trials: &CuttingTrials, fit: &ForceGroup) -> Option<String> {
+    if fit.process != Process::Milling || !trials.tool.has_straight_edge() {
+        return None;
+    }
+    let known = |label: &str| {
+        let own = fit.coefficients.iter().find(|c| c.label == label)?;
+        Some((own.value?, own.std_error?))
+    };
+    let ((tangential, tangential_std), (radial, radial_std)) = (known("Ktc")?, known("Krc")?);
+    (tangential > 0.0 && radial - tangential > 2.0 * radial_std.hypot(tangential_std)).then(|| {
+        format!(
+            "Krc ({radial:.0} N/mm²) is larger than Ktc ({tangential:.0} N/mm²): few metals press back harder than they are cut. The axes \
+             of a dynamometer that stands turned about z by 20° to 30° make it so, or x and y that are mixed up: check how it was mounted \
+             (`tool_from_dyno` in [dynamometer]); a worn edge puts it into Kre rather"
+        )
+    })
+}
+
+/// Standard errors, without what teeth that differ add, and part of a coefficient, that they must move it by to be told.
+const MOVED_SIGMAS: f64 = 2.0;
+const MOVED_PART: f64 = 0.01;
+
+/// Teeth that cut unequally, where that moves a coefficient.
+pub(super) fn of_uneven_teeth(cuts: &[&CutAnalysis], fit: &ForceGroup) -> Option<String> {
+    let moved = fit.coefficients.iter().filter_map(|c| {
+        let (value, std, moved) = (c.value?, c.std_error?, c.moved_by_teeth);
+        let without = (std * std - moved * moved).max(0.0).sqrt();
+        let is_told = moved.abs() > MOVED_SIGMAS * without && moved.abs() > MOVED_PART * value.abs();
+        let side = if moved < 0.0 { "low" } else { "high" };
+        is_told.then(|| format!("{} {} {} {side}", c.label, figures(moved.abs(), 2), c.unit))
+    });
+    let moved: Vec<String> = moved.collect();
+    let offsets: Vec<f64> = cuts
+        .iter()
+        .filter_map(|c| Some(c.uneven_teeth.as_ref()?.offset_mm))
+        .collect();
+    (!moved.is_empty()).then(|| {
+        format!(
+            "the teeth cut unequally, as a tool makes them that runs out by about {} mm: near the ends of the immersion the lower ones do \
+             not cut, which makes {} (their standard errors allow for it); clamp the tool more truly, list its teeth in \
+             tooth_radius_offset_mm, or let `lobestone add DIR tooth-radii` find them",
+            figures(crate::signal::median(&offsets), 1),
+            moved.join(", ")
         )
     })
 }

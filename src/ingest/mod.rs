@@ -44,6 +44,7 @@ pub use quality::quality_warnings;
 pub use read::{read_file, read_frf_file, read_frfs, read_memory, read_time};
 pub(crate) use tables::channel_names::{is_called_acceleration, is_called_hammer, is_called_marker};
 pub use text::shown;
+pub(crate) use text::without_byte_order_mark;
 pub use units::unit_of_charge_or_other;
 
 /// The first sheet of a workbook (xlsx) as tab separated text; `None` for all else.

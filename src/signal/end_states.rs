@@ -17,6 +17,9 @@ const LOUDNESS_SIGMA: f64 = 4.0;
 /// Two states differ in kind when their distance is beyond this part of the largest distance.
 const SAME_STATE: f64 = 0.35;
 
+/// A third of what lies between the ends speaks for it where it is further off both, by this factor, than its middle.
+const CLEARLY_FURTHER: f64 = 1.5;
+
 /// Air before and air after have the same noise, up to this ratio of energies.
 const QUIET: f64 = 1.6;
 
@@ -159,6 +162,10 @@ pub(super) fn air_states(
     } else {
         start.clone()
     };
+    // The tool may be out of the work in the middle, between two passes: then one of the outer thirds speaks for the cut.
+    let third = m_to.saturating_sub(m_from) / 3;
+    let outer = [m_from..m_from + third, m_to - third..m_to];
+    let outer = outer.iter().filter(|r| r.len() >= MIN_STATE_BLOCKS);
     let of = |r: &Range<usize>, pick: fn(&SignalBlocks) -> &Vec<f64>| -> Vec<f64> {
         let part = |b: &SignalBlocks| pick(b).get(r.clone()).map_or(0.0, median);
         blocks.iter().map(part).collect()
@@ -178,7 +185,8 @@ pub(super) fn air_states(
         let e = energy(r);
         e.iter().zip(&quietest).map(|(s, q)| (s / q).powi(2)).sum::<f64>() / e.len().max(1) as f64
     };
-    let (ls, lm, le) = (loudness(&start), loudness(&middle), loudness(&end));
+    let (ls, le) = (loudness(&start), loudness(&end));
+    let lm = outer.clone().map(loudness).fold(loudness(&middle), f64::max);
     let loudest = ls.max(lm).max(le);
     let least = ls.min(lm).min(le);
     if entry_blocks.is_none() && loudest > 2.0 * least {
@@ -208,8 +216,16 @@ pub(super) fn air_states(
             .sum::<f64>()
             .sqrt()
     };
-    let (s, m, e) = (level(&start), level(&middle), level(&end));
-    let (sm, em, se) = (distance(&s, &m), distance(&e, &m), distance(&s, &e));
+    let (s, e) = (level(&start), level(&end));
+    let off = |m: &[f64]| [distance(&s, m), distance(&e, m)];
+    let [mut sm, mut em] = off(&level(&middle));
+    for [other_sm, other_em] in outer.map(|r| off(&level(r))) {
+        // On the way from one state to the other the sum is the same everywhere.
+        if other_sm + other_em > CLEARLY_FURTHER * (sm + em) {
+            (sm, em) = (other_sm, other_em);
+        }
+    }
+    let se = distance(&s, &e);
     let largest = sm.max(em).max(se);
     if m_to - m_from >= MIN_STATE_BLOCKS {
         if sm < SAME_STATE * largest {

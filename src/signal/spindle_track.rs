@@ -36,6 +36,8 @@ pub struct SpindleTrack {
     pub smear_rad: f64,
     /// Share of the line's power that is in step: at the stated speed, and along the track.
     pub in_step: [f64; 2],
+    /// Part by which the line's amplitude changes over the window.
+    line_change: f64,
     /// First sample of the window.
     from: usize,
     samples_per_turn: f64,
@@ -57,6 +59,8 @@ const FURTHEST: f64 = 0.03;
 const WITHIN_A_TURN: f64 = 1e-3;
 /// Turns of the line from one turn of the tool to the next, above what is stated, up to which the count is sure.
 const SURE_STEP: f64 = 0.4;
+/// Part by which the line's amplitude may change over the window beside what changes of the speed make of it.
+const ONE_FORCE: f64 = 0.15;
 /// Smear of the followed line, rad of its own phase (rms), from which on it is reported: at 0.15 the line's average loses 1 %.
 const WORTH_TELLING: f64 = 0.15;
 /// Standard deviations that a part of the profile must exceed zero by to be reported.
@@ -95,6 +99,7 @@ pub fn spindle_track<S: Sample>(
     orders
         .into_iter()
         .filter_map(|order| follow(&own, start, order))
+        .filter(|track| track.is_of_one_force())
         .find(|track| track.in_step[1] >= LEAST_IN_STEP)
         .filter(SpindleTrack::is_told)
 }
@@ -163,6 +168,9 @@ fn follow<S: Sample>(windows: &[&[S]], start: Start, order: usize) -> Option<Spi
         });
         sums.sum::<f64>() / (turns as f64 * power)
     };
+    let amplitude: Vec<f64> = (0..turns)
+        .map(|k| of_turns.iter().map(|z| z[k].norm_sqr()).sum::<f64>().sqrt())
+        .collect();
     let n = order as f64;
     let in_step = [in_step(&|_| 0.0), in_step(&|k| profile.at(k, turns))];
     let [rate, rate_std, change, change_std] = profile.of_speed(turns);
@@ -178,6 +186,7 @@ fn follow<S: Sample>(windows: &[&[S]], start: Start, order: usize) -> Option<Spi
         wander_std: wander_std / (TAU * n),
         smear_rad: smear_rad(&coefficients, turns),
         in_step,
+        line_change: super::change(&amplitude),
         from,
         samples_per_turn,
         turns,
@@ -362,6 +371,13 @@ impl SpindleTrack {
             (self.droop, self.droop_std),
             (self.wander, self.wander_std),
         ]
+    }
+
+    /// Where the engagement changes, the angle at which a tooth cuts does as well, and the force with it: no change of the speed,
+    /// which makes the chip as much thicker as the spindle is slower.
+    fn is_of_one_force(&self) -> bool {
+        let speed = self.offset.abs() + self.droop.abs() + 3.0 * self.wander;
+        self.line_change.abs() < ONE_FORCE + 3.0 * speed
     }
 
     fn is_told(&self) -> bool {

@@ -11,7 +11,7 @@ use super::air_check::air_in;
 use super::blocks::{SignalBlocks, Spindle, line, median, robust_std};
 use super::drift::Air;
 use super::end_states::{MIN_STATE_BLOCKS, air_states, departure};
-use super::engagement::{full_engagement, loudness};
+use super::engagement::{OneSidedZero, full_engagement, loudness, passes, plateau};
 use crate::data::Sample;
 use crate::statistics::quantile;
 
@@ -22,6 +22,11 @@ pub struct Phases {
     pub air: Air,
     /// First contact to last.
     pub cutting: Range<usize>,
+    /// Where the tool leaves the work in between: each pass, of which the steady part is one's. Empty where it stays in it.
+    pub passes: Vec<Range<usize>>,
+    /// Where the force steps from one level to another within the cut: all of the cut that the steady part could be of, of which it
+    /// is the longest stretch at one level.
+    pub levels: Option<Range<usize>>,
     /// Full engagement, a whole number of revolutions.
     pub steady: Range<usize>,
 }
@@ -54,6 +59,8 @@ pub fn find_phases<S: Sample>(
         return Some(Phases {
             air: Air::default(),
             cutting: 0..samples,
+            passes: Vec::new(),
+            levels: None,
             steady: whole(0.0..samples as f64)?,
         });
     }
@@ -69,15 +76,28 @@ pub fn find_phases<S: Sample>(
     let air_after = after.then(|| sample(last_start as f64 + guard)..samples);
     let long_enough = |r: &Range<usize>| r.len() as f64 >= 2.0 * per_block;
     let (mut before, mut after) = (air_before.filter(long_enough), air_after.filter(long_enough));
+    let per_turn = (spindle.samples_per_revolution / per_block).round() as usize;
+    // Blocks of the air at either end, as far as it is some.
+    let air_blocks = |before: bool, after: bool| -> Vec<Range<usize>> {
+        let before = before.then_some(0..start_end.saturating_sub(2).max(1));
+        let after = after.then_some((last_start + 2).min(count - 1)..count);
+        before.into_iter().chain(after).collect()
+    };
+    let passes_between = |before: bool, after: bool| {
+        let (lo, hi) = (
+            if before { start_end } else { 0 },
+            if after { last_start } else { count },
+        );
+        let air = air_blocks(before, after);
+        let engaged = loudness(&blocks, &air, OneSidedZero::Stays, per_turn);
+        passes(&engaged, &(lo..hi.max(lo)), &air, MIN_STATE_BLOCKS)
+    };
     let mut air_is_doubtful = false;
     if entry_samples.is_none() {
-        // The campaign says that it is a cut; what is no different from the rest of it is no air.
-        let cutting = sample(if before.is_some() { start_end as f64 } else { 0.0 })
-            ..sample(if after.is_some() {
-                last_start as f64
-            } else {
-                count as f64
-            });
+        // The campaign says that it is a cut; what is no different from the rest of it is no air. Of several passes the longest is
+        // looked at.
+        let longest = longest(&passes_between(before.is_some(), after.is_some()));
+        let cutting = sample(longest.start as f64)..sample(longest.end as f64);
         let air = |r: Range<usize>| air_in(channels, &r, &cutting, spindle).filter(long_enough);
         let found = before.is_some() || after.is_some();
         (before, after) = (before.and_then(air), after.and_then(air));
@@ -88,29 +108,38 @@ pub fn find_phases<S: Sample>(
     if lo + MIN_STATE_BLOCKS > hi {
         return None;
     }
-    let air_blocks: Vec<Range<usize>> = [
-        before.as_ref().map(|_| 0..start_end.saturating_sub(2).max(1)),
-        after.as_ref().map(|_| (last_start + 2).min(count - 1)..count),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
     let cutting = sample(lo as f64)..sample(hi as f64);
-    let contact = cutting.start as f64;
-    let full = entry_samples
-        .filter(|_| before.is_some())
-        .map(|entry| {
-            // The contact may have been noticed a block early.
-            let start = contact + 1.03 * entry + guard * per_block;
-            (start / per_block).ceil() as usize
-        })
-        .filter(|&start| start + MIN_STATE_BLOCKS < hi);
-    let per_turn = (spindle.samples_per_revolution / per_block).round() as usize;
-    let engaged = loudness(&blocks, &air_blocks, per_turn);
-    let inside = match (entry_samples, full) {
-        (Some(_), full) => full.unwrap_or(lo)..hi,
-        (None, _) => full_engagement(&engaged, lo..hi),
+    let passes = passes_between(before.is_some(), after.is_some());
+    let air_blocks = air_blocks(before.is_some(), after.is_some());
+    let engaged = loudness(&blocks, &air_blocks, OneSidedZero::Unknown, per_turn);
+    let inside = match entry_samples.filter(|_| before.is_some()) {
+        Some(entry) => {
+            // Full engagement follows from how far the tool has gone in; the contact may have been noticed a block early.
+            let entry = (1.03 * entry / per_block + guard).ceil() as usize;
+            let mut gone = 0;
+            let engaged_in = passes.iter().map(|pass| {
+                let left = entry.saturating_sub(gone).min(pass.len());
+                gone += pass.len();
+                pass.start + left..pass.end
+            });
+            let full = longest(&engaged_in.collect::<Vec<_>>());
+            if full.len() > MIN_STATE_BLOCKS {
+                full
+            } else {
+                longest(&passes)
+            }
+        }
+        None if entry_samples.is_some() => longest(&passes),
+        None => full_engagement(&engaged, longest(&passes)),
     };
+    let at_one_level = match entry_samples {
+        None => plateau(&blocks, &air_blocks, per_turn, &inside),
+        Some(_) => None,
+    };
+    let levels = at_one_level
+        .as_ref()
+        .map(|_| sample(inside.start as f64)..sample(inside.end as f64));
+    let inside = at_one_level.unwrap_or(inside);
     // A clip of a few turns that are all alike has no ends to keep clear of.
     let is_even_clip = air_blocks.is_empty() && per_block < spindle.samples_per_revolution && {
         let of_clip = &engaged[inside.clone()];
@@ -124,7 +153,26 @@ pub fn find_phases<S: Sample>(
     };
     let steady = whole(found.start as f64 * per_block..found.end as f64 * per_block)?;
     let air = Air { before, after };
-    Some(Phases { air, cutting, steady })
+    let passes = match passes.len() {
+        1 => Vec::new(),
+        _ => passes
+            .iter()
+            .map(|p| sample(p.start as f64)..sample(p.end as f64))
+            .collect(),
+    };
+    Some(Phases {
+        air,
+        cutting,
+        passes,
+        levels,
+        steady,
+    })
+}
+
+/// The first of the longest; empty where there are none.
+fn longest(ranges: &[Range<usize>]) -> Range<usize> {
+    let first = ranges.iter().rev().max_by_key(|r| r.len());
+    first.cloned().unwrap_or(0..0)
 }
 
 /// The largest whole number of revolutions inside `span`, centred in it, rounded to samples. Less than one

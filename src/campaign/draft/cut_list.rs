@@ -1,12 +1,15 @@
 //! A list of cuts as labs keep it: a table with a row a cut, exported as CSV.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::answers::Answers;
 use super::found::{Scan, cut_ids, stem};
-use super::list_columns::{Column, DIAMETER, DIRECTION, NUMBER, OF_TOOL, column, english, is_down, plain};
+use super::list_columns::{
+    Column, DIAMETER, DIRECTION, NUMBER, OF_TOOL, TEETH, column, english, is_down, name_of, plain,
+};
 use crate::campaign::load::CUT;
-use crate::ingest::sheet_text;
+use crate::ingest::{sheet_text, without_byte_order_mark};
 use crate::text::{closest, shown_briefly as shown};
 use crate::{Error, InputError, Result};
 
@@ -47,12 +50,14 @@ fn naming_column(head: &[String]) -> Option<usize> {
     at("file").or_else(|| at(NUMBER)).or_else(|| at("id"))
 }
 
-fn decoded(bytes: Vec<u8>) -> String {
-    match String::from_utf8(bytes) {
-        Ok(text) => text.trim_start_matches('\u{feff}').to_string(),
+/// As UTF-8 with line feeds alone: `csv` counts the lines of others from the wrong end.
+fn decoded(bytes: &[u8]) -> String {
+    let text = match String::from_utf8(without_byte_order_mark(bytes).into_owned()) {
+        Ok(text) => text,
         // Latin-1.
         Err(e) => e.as_bytes().iter().map(|b| char::from(*b)).collect(),
-    }
+    };
+    text.replace("\r\n", "\n").replace('\r', "\n")
 }
 
 /// The line of the column names: the first that names records and something that was cut with.
@@ -66,7 +71,7 @@ fn names_line(text: &str) -> Option<usize> {
 
 /// Is this text the beginning of a list of cuts?
 pub(super) fn looks_like_one(start: &[u8]) -> bool {
-    names_line(&decoded(start.to_vec())).is_some()
+    names_line(&decoded(start)).is_some()
 }
 
 /// Reads a CSV whose columns are keys of `[[cut]]` or usual names for them in English, German, French or Spanish, one of them
@@ -82,7 +87,7 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         InputError::new(problem).file(file).line(line).remedy(remedy)
     };
     let bytes = std::fs::read(file).map_err(|e| Error::io(file, e))?;
-    let text = sheet_text(&bytes).unwrap_or_else(|| decoded(bytes));
+    let text = sheet_text(&bytes).unwrap_or_else(|| decoded(&bytes));
     let skipped = names_line(&text).unwrap_or(0);
     let offset: usize = text.split_inclusive('\n').take(skipped).map(str::len).sum();
     let text = &text[offset..];
@@ -147,6 +152,8 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         .into());
     };
     let mut of_tool = OfTool::default();
+    // The row that spoke of each record, and rows that speak of none.
+    let (mut seen, mut strangers) = (BTreeMap::new(), Vec::new());
     for row in &rows {
         let line = skipped + row.position().map_or(1, |p| p.line() as usize);
         let name = row[naming].replace('\\', "/");
@@ -157,16 +164,28 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
         }
         let found = cut_in_file(&name, &rows, row, naming, &ids, scan);
         let Some(at) = found.or_else(|| record_named(&name, scan)) else {
+            let unread = scan.not_used.iter().find(|(path, _)| is_named(path, &name));
+            if let Some((path, why)) = unread {
+                let problem = format!("{} is no force record that can be read: {why}", shown(path));
+                return Err(wrong(problem, line, format!("see `lobestone inspect {}`", shown(path))).into());
+            }
+            strangers.push((line, name));
+            continue;
+        };
+        if let Some((first, others)) = seen.get(&at) {
+            if *others == row {
+                passed_over.push(format!("line {line} is not used: the same as line {first}"));
+                continue;
+            }
             return Err(wrong(
-                format!(
-                    "{:?} names no force record of the folder, or several",
-                    shown(&name)
-                ),
+                format!("lines {first} and {line} name the same record, {:?}, and say different things", shown(&name)),
                 line,
-                "write the file's name, or its path from the folder".into(),
+                "leave the one that holds; a record of several cuts needs a [[cut]] for each in campaign.toml, with steady_s = [from, to]"
+                    .into(),
             )
             .into());
-        };
+        }
+        seen.insert(at, (line, row));
         let table = format!("cut {}", ids[at]);
         let mut angles = [None, None];
         for (i, (column, value)) in columns.iter().zip(row.iter()).enumerate() {
@@ -176,7 +195,17 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             if value.is_empty() || i == naming || *key == NUMBER {
                 continue;
             }
-            let value = scaled(value, *factor);
+            let value = match is_number(key) {
+                true => in_key_unit(value, &head[i], *factor, key).map_err(|problem| {
+                    let remedy = "write the number alone, and its unit in the column's name: ap [mm]";
+                    wrong(
+                        format!("column {:?}: {problem}", shown(&head[i])),
+                        line,
+                        remedy.into(),
+                    )
+                })?,
+                false => value.to_string(),
+            };
             match *key {
                 "file" => (),
                 "start_deg" => angles[0] = Some(value.replace(',', ".")),
@@ -229,6 +258,21 @@ pub fn read_cut_list(file: &Path, scan: &Scan, answers: &mut Answers) -> Result<
             }
         }
     }
+    for (line, name) in strangers {
+        if seen.is_empty() {
+            let problem = format!(
+                "{:?} names no force record of the folder, or several",
+                shown(&name)
+            );
+            let remedy = "write the file's name, or its path from the folder";
+            return Err(wrong(problem, line, remedy.into()).into());
+        }
+        let row = format!(
+            "line {line} is not used: {:?} names no force record of the folder, or several",
+            shown(&name)
+        );
+        passed_over.push(row);
+    }
     let turned = ids
         .iter()
         .any(|id| answers.get("cut", id, "process") == Some("turning"));
@@ -265,12 +309,70 @@ impl OfTool {
     }
 }
 
-fn scaled(value: &str, factor: f64) -> String {
-    match value.replace(',', ".").parse::<f64>() {
-        // No unit: as it was typed.
-        Ok(number) if factor != 1.0 => format!("{}", number * factor),
-        _ => value.to_string(),
+/// Does a column of this key hold numbers?
+fn is_number(key: &str) -> bool {
+    key == TEETH
+        || ["_mm", "_rpm", "_deg", "_per_min", "_per_turn"]
+            .iter()
+            .any(|end| key.ends_with(end))
+}
+
+/// The number of a cell in the unit of `key`, as it was typed where that is it: `0,04`, `3'007 U/min`, `Ø12 mm`, `40 µm`. `factor`: of
+/// the column `head`.
+fn in_key_unit(cell: &str, head: &str, factor: f64, key: &str) -> std::result::Result<String, String> {
+    let no_number = || format!("{:?} is no number", shown(cell));
+    let begins = |c: char| c.is_ascii_digit() || "+-.,".contains(c);
+    let text = cell.trim_start_matches(|c: char| "Øø⌀= ".contains(c));
+    let is_gap = |c: char| c.is_whitespace() || "'’".contains(c);
+    let end = text
+        .find(|c: char| !begins(c) && !is_gap(c))
+        .unwrap_or(text.len());
+    let is_exponent = text[end..].starts_with(['e', 'E']) && text.replace(',', ".").parse::<f64>().is_ok();
+    let (number, unit) = match is_exponent {
+        true => (text, ""),
+        false => text.split_at(end),
+    };
+    let (number, unit) = match without_gaps(number.trim()) {
+        Some(number) if !unit.starts_with('/') => (number, unit),
+        // `3007 1/min`: the last figure is one of the unit's.
+        _ => {
+            let (number, unit) = text.split_once(char::is_whitespace).ok_or_else(no_number)?;
+            (without_gaps(number).ok_or_else(no_number)?, unit)
+        }
+    };
+    let value: f64 = number.replace(',', ".").parse().map_err(|_| no_number())?;
+    if !value.is_finite() {
+        return Err(no_number());
     }
+    let factor = match unit.trim() {
+        "" => factor,
+        unit => {
+            let own = column(&format!("{} [{unit}]", name_of(head)), &keys())?;
+            let own = own
+                .filter(|c| c.key == key)
+                .ok_or_else(|| format!("{:?} has a unit of something else", shown(cell)))?;
+            own.factor
+        }
+    };
+    Ok(if factor == 1.0 {
+        number
+    } else {
+        format!("{}", value * factor)
+    })
+}
+
+/// A number without the marks between its thousands; `None` where they stand elsewhere.
+fn without_gaps(number: &str) -> Option<String> {
+    let is_gap = |c: char| c.is_whitespace() || "'’".contains(c);
+    let mut groups = number.split(is_gap);
+    let first = groups.next().unwrap_or("");
+    let has_three = |group: &str| {
+        let digits = group.split(['.', ',']).next().unwrap_or("");
+        digits.len() == 3 && digits.bytes().all(|b| b.is_ascii_digit())
+    };
+    let rest: Vec<&str> = groups.collect();
+    let is_whole = rest.is_empty() || first.len() <= 3;
+    (is_whole && rest.iter().all(|g| has_three(g))).then(|| format!("{first}{}", rest.concat()))
 }
 
 /// `12.000` or `12,000` as a spindle speed: a mark of thousands, where it would be slower than a hundred turns a minute.
@@ -339,6 +441,47 @@ fn record_named(name: &str, scan: &Scan) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn cells_are_read_as_people_write_them() {
+        let read = |cell: &str, head: &str| {
+            let column = column(head, &keys()).unwrap().unwrap();
+            in_key_unit(cell, head, column.factor, column.key)
+        };
+        for (cell, head, value) in [
+            ("0,04", "fz [mm]", "0,04"),
+            ("3'007", "n", "3007"),
+            ("3 007 U/min", "Drehzahl [1/min]", "3007"),
+            ("3\u{a0}007", "Drehzahl", "3007"),
+            ("12 345,5", "n", "12345,5"),
+            ("0,04 mm", "fz [mm]", "0,04"),
+            ("40 µm", "fz [mm]", "0.04"),
+            ("40", "fz [µm]", "0.04"),
+            ("0.04 mm", "fz [µm]", "0.04"),
+            ("Ø12 mm", "D", "12"),
+            ("1e3", "n", "1e3"),
+            ("50 1/s", "n [1/min]", "3000"),
+            ("3007 1/min", "n", "3007"),
+            ("30°", "Drall", "30"),
+        ] {
+            let found = read(cell, head);
+            let same = |a: &str| a.replace(',', ".").parse::<f64>().unwrap();
+            assert!(
+                (same(found.as_ref().unwrap()) - same(value)).abs() < 1e-12,
+                "{cell}: {found:?}"
+            );
+        }
+        for (cell, head) in [
+            ("ca. 3", "ap"),
+            ("3 0", "n"),
+            ("3 mm/min", "ap"),
+            ("3 kg", "ap"),
+            ("-", "n"),
+            ("inf", "ap"),
+        ] {
+            assert!(read(cell, head).is_err(), "{cell}");
+        }
+    }
 
     #[test]
     fn a_mark_of_thousands_is_none_of_decimals() {

@@ -310,6 +310,11 @@ pub(super) struct Column {
     pub factor: f64,
 }
 
+/// A column's name without its unit.
+pub(super) fn name_of(head: &str) -> &str {
+    split_unit(head).0
+}
+
 /// What a column's head says. `Ok(None)`: nothing that is known here.
 ///
 /// # Errors

@@ -28,6 +28,9 @@ pub struct Coefficient {
     pub std_error: Option<f64>,
     /// From drawing the cuts again; `None` with too few cuts.
     pub std_error_bootstrap: Option<f64>,
+    /// By what teeth that cut unequally move it, in `unit`, as far as the records tell how unequally; the standard errors allow for it. 0
+    /// where they cut alike.
+    pub moved_by_teeth: f64,
     /// Held at zero by `--nonnegative-edges`.
     pub constraint_active: bool,
     /// What it would be with no constraint on any coefficient; only where a constraint is active on this one.
@@ -155,10 +158,11 @@ impl ForceGroup {
         options: CfcOptions,
     ) -> Result<Option<ForceGroup>> {
         let observations = observations(cuts, rows);
-        let free = fit(&observations).map(|f| f.covering(&observations));
-        let (Some(first), Some(free)) = (cuts.first(), free) else {
+        let (Some(first), Some(fitted)) = (cuts.first(), fit(&observations)) else {
             return Ok(None);
         };
+        let moved_by_teeth = moved_by_teeth(&fitted, &observations, cuts);
+        let free = fitted.covering(&observations);
         let speeds = || cuts.iter().map(|c| c.cutting_speed_m_per_min);
         let mut group = ForceGroup {
             process: first.process,
@@ -191,6 +195,12 @@ impl ForceGroup {
         if free.inseparable.is_empty() {
             let chosen = group.choose(&observations, &free, options)?;
             (solution, share) = (chosen.value, chosen.share);
+        }
+        for (coefficient, moved) in group.coefficients.iter_mut().zip(moved_by_teeth) {
+            coefficient.moved_by_teeth = moved;
+            for std in [&mut coefficient.std_error, &mut coefficient.std_error_bootstrap] {
+                *std = std.map(|std| std.hypot(moved));
+            }
         }
         group.points = observations
             .iter()
@@ -284,6 +294,20 @@ impl ForceGroup {
     }
 }
 
+/// By what the coefficients are off because teeth cut unequally.
+fn moved_by_teeth(fitted: &CoefficientFit, observations: &[Observation], cuts: &[&CutAnalysis]) -> Vec<f64> {
+    let change = cuts_of(observations, cuts)
+        .into_iter()
+        .zip(observations)
+        .map(|(cut, o)| {
+            let own = cut.and_then(|c| c.uneven_teeth.as_ref()?.change.get(o.axis.index()));
+            own.map_or(0.0, |row| {
+                row.iter().zip(&fitted.solution).map(|(r, k)| r * k).sum()
+            })
+        });
+    fitted.change_with(observations, &change.collect::<Vec<f64>>())
+}
+
 /// What the ordinary fit says, before constraints and second opinions.
 fn free_coefficients(process: Process, free: &CoefficientFit) -> Vec<Coefficient> {
     let one = |(j, kind): (usize, &CoefficientKind)| Coefficient {
@@ -297,6 +321,7 @@ fn free_coefficients(process: Process, free: &CoefficientFit) -> Vec<Coefficient
         constraint_active: false,
         unconstrained: None,
         other_method: None,
+        moved_by_teeth: 0.0,
     };
     coefficients_of(process).iter().enumerate().map(one).collect()
 }

@@ -55,6 +55,16 @@ impl CoefficientFit {
         row.iter().zip(&self.solution).map(|(r, x)| r * x).sum()
     }
 
+    /// By what the solution changes where each observation changes by so much. Of the fit as it was made, before
+    /// [`Self::covering`].
+    pub fn change_with(&self, observations: &[Observation], change: &[f64]) -> Vec<f64> {
+        let mut sum = DVector::zeros(self.solution.len());
+        for ((o, weight), change) in observations.iter().zip(&self.weight).zip(change) {
+            sum += DVector::from_column_slice(&o.row) * (weight * change);
+        }
+        (&self.covariance * sum).iter().copied().collect()
+    }
+
     /// With standard errors that also cover a scatter which is larger in some cuts than in others, as where it is a share of the force:
     /// widened to those of the sandwich estimator HC3 where these are larger (MacKinnon and White 1985, eq. 11; Long and Ervin
     /// 2000). HC3 alone is too small as often as too large with the few cuts that there are. Axes whose residuals are no larger

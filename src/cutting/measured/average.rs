@@ -277,8 +277,10 @@ mod tests {
                 channel(ForceAxis::Z, forces[1], size),
                 channel(ForceAxis::Mz, torque, torque),
             ],
+            contact_share: 1.0,
             averages: [None; 4],
             tooth_line: None,
+            uneven_teeth: None,
             spindle: None,
             notices: Vec::new(),
         }

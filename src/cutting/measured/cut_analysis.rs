@@ -1,6 +1,7 @@
 //! What one force record says: averages, the zero of each channel, and what its owner should know.
 
 use crate::cutting::force_model::force_axis::ForceAxis;
+use crate::cutting::measured::uneven_teeth::UnevenTeeth;
 use crate::data::Process;
 use crate::signal::{DriftLine, SpindleTrack, ToothLine};
 
@@ -77,10 +78,14 @@ pub struct CutAnalysis {
     pub revolutions: f64,
     /// The usable channels, ordered by axis.
     pub channels: Vec<ChannelAnalysis>,
+    /// Part of each turn in which the edge cuts: less than 1 where it turns an interrupted surface. Means are those of that part.
+    pub contact_share: f64,
     /// Tool axes x, y, z and torque; `None` where a channel it needs is missing or dead.
     pub averages: [Option<Average>; 4],
     /// Milling: the tooth-passing line in all force channels together; `None` where the window is too short for one.
     pub tooth_line: Option<ToothLine>,
+    /// Milling: that the teeth, which are not listed one by one, cut unequally, where that stands above the noise.
+    pub uneven_teeth: Option<UnevenTeeth>,
     /// How the spindle ran, where it did not keep the stated speed.
     pub spindle: Option<SpindleTrack>,
     /// What its owner should know.

@@ -2,9 +2,11 @@
 
 pub(crate) mod air;
 pub(crate) mod average;
+pub(crate) mod contact;
 pub(crate) mod cut_analysis;
 pub(crate) mod faults;
 pub(crate) mod in_step;
 pub(crate) mod leak;
 pub(crate) mod record;
 pub(crate) mod teeth;
+pub(crate) mod uneven_teeth;

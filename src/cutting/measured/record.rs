@@ -10,14 +10,16 @@ use crate::cutting::force_model::drill_geometry::DrillGeometry;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::{air_notices, believable_air};
 use crate::cutting::measured::average::average;
+use crate::cutting::measured::contact::{Contact, INTERRUPTED, at_full_contact, interrupted};
 use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
 use crate::cutting::measured::leak::high_pass;
 use crate::cutting::measured::teeth::{
     CERTAIN, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn, tooth_back_mm,
-    tooth_passing_too_weak,
+    tooth_passing_too_weak, uneven_chip_mm,
 };
+use crate::cutting::measured::uneven_teeth::UnevenTeeth;
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, Sample, TimeRecord, Tool};
 use crate::signal::{
@@ -36,6 +38,10 @@ const CLIPPED: &str = "clipped, so that the true forces are larger: the channel 
      at the amplifier and cut again";
 const CLIPPED_ELSEWHERE: &str = "clipped outside the steady window: averages are not touched, but choose a larger range at the \
      amplifier";
+const PASSES: &str = "the tool leaves the work in between, so that the record holds several passes: the longest is taken; passes of one \
+     depth and feed are cuts of one kind, others need a cut each in the campaign, with steady_s = [from, to] to choose the pass";
+const LEVELS: &str = "the force steps from one level to another within the cut, as where depth, engagement or feed change: the longest \
+     stretch at one level is taken; give steady_s = [from, to] where the stated depth, engagement and feed hold";
 const UNSTEADY_CUT: &str = "the force changes over the steady window: a slow entry or exit, a depth that changes, or wear; look at \
      the record and give steady_s = [from, to]";
 const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of once per tooth: one is missing or chipped, the runout \
@@ -145,7 +151,24 @@ pub fn analyse_cut<S: Sample>(
         &mut notices,
     );
     let phases = Phases { air, ..phases };
-    let channels: Vec<ChannelAnalysis> = usable
+    if !phases.passes.is_empty() {
+        let each = phases.passes.iter().map(|pass| {
+            let [from, to] = seconds(pass);
+            format!("{from:.2} to {to:.2} s")
+        });
+        notices.push(Notice {
+            kind: PASSES,
+            detail: each.collect::<Vec<_>>().join(", "),
+        });
+    }
+    if let Some(all) = &phases.levels {
+        let ([from, to], [taken, end]) = (seconds(all), seconds(&steady));
+        notices.push(Notice {
+            kind: LEVELS,
+            detail: format!("{taken:.2} to {end:.2} s of {from:.2} to {to:.2} s"),
+        });
+    }
+    let mut channels: Vec<ChannelAnalysis> = usable
         .iter()
         .map(|&(axis, name, values)| {
             let mut drift = fit_drift(values, rate, record.start_s, &phases.air);
@@ -168,6 +191,17 @@ pub fn analyse_cut<S: Sample>(
             }
         })
         .collect();
+    let contact = match cut.geometry {
+        CutGeometry::Turning { .. } => contact(&channels, &usable, &steady, samples_per_revolution, record),
+        CutGeometry::Milling { .. } | CutGeometry::Drilling { .. } => None,
+    };
+    if let Some(contact) = contact {
+        at_full_contact(&mut channels, contact);
+        notices.push(Notice {
+            kind: INTERRUPTED,
+            detail: format!("{:.1} % of the turn in the air", 100.0 * (1.0 - contact.share)),
+        });
+    }
     for channel in &channels {
         let mean = channel.mean.average.value;
         if mean.abs() > LARGEST_LOAD {
@@ -195,10 +229,17 @@ pub fn analyse_cut<S: Sample>(
         });
         notices.extend(told);
     }
+    let pass = phases.passes.iter().find(|p| p.contains(&steady.start));
+    let of_cut = steady.len() as f64 / pass.unwrap_or(&phases.cutting).len().max(1) as f64;
     unsteady_notice(
         &usable,
         &channels,
         &steady,
+        if of_cut < 0.5 && !steady_given && phases.levels.is_none() {
+            STILL_ENTERING
+        } else {
+            UNSTEADY
+        },
         samples_per_revolution,
         record,
         &mut notices,
@@ -228,6 +269,7 @@ pub fn analyse_cut<S: Sample>(
         // One edge that never leaves the work: no line to judge the speed by.
         CutGeometry::Turning { .. } => None,
     };
+    let mut of_turn = None;
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
             kind: WRONG_SPEED,
@@ -235,7 +277,10 @@ pub fn analyse_cut<S: Sample>(
         });
     } else {
         // At a wrong speed the orders are no orders of the turn, and say nothing of the teeth.
-        teeth_notice(trials, cut, &channels, &usable, &steady, record, &mut notices);
+        of_turn = turn_orders(trials, cut, &channels, &usable, &phases, record);
+        if let Some(of_turn) = &of_turn {
+            teeth_notice(of_turn, cut, &mut notices);
+        }
     }
     Ok(CutAnalysis {
         cut: cut_index,
@@ -253,9 +298,11 @@ pub fn analyse_cut<S: Sample>(
         steady_s: seconds(&steady),
         steady_given,
         revolutions,
+        contact_share: contact.map_or(1.0, |c| c.share),
         averages: in_tool_axes(trials.tool_from_dyno, &channels),
         channels,
         tooth_line,
+        uneven_teeth: of_turn.as_ref().and_then(TurnOrders::uneven_teeth),
         spindle: None,
         notices,
     })
@@ -407,17 +454,55 @@ fn phases<S: Sample>(
         after: air.after.filter(|r| r.start >= steady.end),
     };
     let cutting = steady.clone();
-    Ok((Phases { air, cutting, steady }, true))
+    Ok((
+        Phases {
+            air,
+            cutting,
+            passes: Vec::new(),
+            levels: None,
+            steady,
+        },
+        true,
+    ))
+}
+
+/// How much of each turn a turning edge cuts, by the channel that carries most of the force; `None` where it stays in the work, or no air
+/// tells the zero.
+fn contact<S: Sample>(
+    channels: &[ChannelAnalysis],
+    usable: &[UsableChannel<S>],
+    steady: &Range<usize>,
+    samples_per_turn: f64,
+    record: &TimeRecord<S>,
+) -> Option<Contact> {
+    let forces = channels
+        .iter()
+        .zip(usable)
+        .filter(|(c, _)| c.axis != ForceAxis::Mz);
+    let size = |c: &ChannelAnalysis| c.mean.average.value.abs();
+    let (channel, (_, _, values)) = forces.max_by(|a, b| size(a.0).total_cmp(&size(b.0)))?;
+    if !(channel.drift.air_before || channel.drift.air_after) {
+        return None;
+    }
+    let time = |i: usize| record.start_s + i as f64 / record.sample_rate_hz;
+    let above: Vec<f64> = steady
+        .clone()
+        .map(|i| values[i].value() - channel.drift.at(time(i)))
+        .collect();
+    interrupted(&above, samples_per_turn)
 }
 
 /// Change of the force over the steady window that is worth telling, as a part of it.
-const UNSTEADY: f64 = 0.1;
+const UNSTEADY: f64 = 0.05;
+/// The same where the window is less than half of the cut: what came before is a slow entry, which such a change shows not to be over.
+const STILL_ENTERING: f64 = 0.015;
 
 /// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does.
 fn unsteady_notice<S: Sample>(
     usable: &[UsableChannel<S>],
     channels: &[ChannelAnalysis],
     steady: &Range<usize>,
+    worth_telling: f64,
     samples_per_revolution: f64,
     record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
@@ -443,7 +528,7 @@ fn unsteady_notice<S: Sample>(
     }
     let loudness: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
     let change = signal::change(&loudness);
-    if change.abs() > UNSTEADY {
+    if change.abs() > worth_telling {
         notices.push(Notice {
             kind: UNSTEADY_CUT,
             detail: format!("by {:+.0} %", 100.0 * change),
@@ -464,43 +549,84 @@ fn is_noise(over_noise: &[f64]) -> bool {
     count > 0.0 && highest < count.ln() + 7.0 && mean < 1.0 + 3.5 / count.sqrt()
 }
 
-#[allow(clippy::too_many_arguments)]
-fn teeth_notice<S: Sample>(
+/// What comes back once per turn in the forces along tool axes x and y.
+struct TurnOrders {
+    milling: MillingCut,
+    /// Orders from 1 on, N.
+    orders: [Vec<Complex64>; 2],
+    /// Standard deviation of each, N.
+    std: [Vec<f64>; 2],
+    /// N; above the zero where `zero_is_known`.
+    mean: [f64; 2],
+    zero_is_known: bool,
+    /// Powers of all channels over those of their noise.
+    over_noise: Vec<f64>,
+    /// The same orders in the air, added up over the channels: what turns with the spindle and is no tooth, N².
+    air_power: Vec<f64>,
+}
+
+impl TurnOrders {
+    /// Where the teeth are not listed one by one.
+    fn uneven_teeth(&self) -> Option<UnevenTeeth> {
+        if !self.milling.places.is_empty() || is_noise(&self.over_noise) {
+            return None;
+        }
+        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
+        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        let known = (self.mean, self.zero_is_known);
+        let chip_mm = uneven_chip_mm(&self.milling, orders, std, known, &self.air_power)?;
+        Some(UnevenTeeth::new(&self.milling, chip_mm))
+    }
+}
+
+/// `None` where a channel is missing, or the tooth passing was not sampled.
+fn turn_orders<S: Sample>(
     trials: &CuttingTrials,
     cut: &Cut,
     channels: &[ChannelAnalysis],
     usable: &[UsableChannel<S>],
-    steady: &Range<usize>,
+    phases: &Phases,
     record: &TimeRecord<S>,
-    notices: &mut Vec<Notice>,
-) {
-    let Some(milling) = MillingCut::new(trials.tool, &cut.geometry) else {
-        return;
-    };
+) -> Option<TurnOrders> {
+    let milling = MillingCut::new(trials.tool, &cut.geometry)?;
     let rate = record.sample_rate_hz;
+    let steady = &phases.steady;
     let window = steady.start..steady.end.min(steady.start + MOST_SAMPLES);
     let per_turn = rate * 60.0 / cut.spindle_rpm;
     if highest_order(per_turn, milling.teeth) < milling.teeth {
-        return;
+        return None;
     }
     // Twice the tooth passing tells of half the true speed, where it was sampled.
     let highest = highest_order(per_turn, 2 * milling.teeth);
-    let of_channel = |axis: ForceAxis| -> Option<(signal::OrderSpectrum, f64, bool)> {
+    let longest_air = [&phases.air.before, &phases.air.after]
+        .into_iter()
+        .flatten()
+        .max_by_key(|r| r.len());
+    let mut air_power = vec![0.0; highest];
+    let mut of_channel = |axis: ForceAxis| -> Option<(signal::OrderSpectrum, f64, bool)> {
         let values = usable.iter().find(|c| c.0 == axis)?.2;
         let channel = channels.iter().find(|c| c.axis == axis)?;
         let spectrum = signal::order_spectrum(&values[window.clone()], rate, per_turn, highest)?;
+        let in_air = longest_air.and_then(|air| {
+            let air = air.start..air.end.min(air.start + MOST_SAMPLES);
+            signal::order_spectrum(&values[air], rate, per_turn, highest)
+        });
+        for (sum, own) in air_power
+            .iter_mut()
+            .zip(in_air.iter().flat_map(|s| &s.coefficient))
+        {
+            *sum += own.norm_sqr();
+        }
         let has_zero = channel.drift.air_before || channel.drift.air_after;
         Some((spectrum, channel.mean.average.value, has_zero))
     };
-    let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(of_channel);
+    let recorded = [ForceAxis::X, ForceAxis::Y, ForceAxis::Z].map(&mut of_channel);
     let mut orders = [0, 1].map(|_| vec![Complex64::ZERO; highest]);
     let mut variance = [0, 1].map(|_| vec![0.0; highest]);
     let (mut mean, mut zero_is_known) = ([0.0; 2], true);
     for (axis, row) in trials.tool_from_dyno.iter().take(2).enumerate() {
         for (weight, channel) in row.iter().zip(&recorded).filter(|(w, _)| **w != 0.0) {
-            let Some((own, value, has_zero)) = channel else {
-                return;
-            };
+            let (own, value, has_zero) = channel.as_ref()?;
             for (sum, o) in orders[axis].iter_mut().zip(&own.coefficient) {
                 *sum += o * *weight;
             }
@@ -515,18 +641,32 @@ fn teeth_notice<S: Sample>(
         let each = own.coefficient.iter().zip(&own.std);
         each.map(|(c, std)| c.norm_sqr() / (std * std))
     });
-    if is_noise(&over_noise.collect::<Vec<f64>>()) {
+    let over_noise = over_noise.collect();
+    let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect());
+    Some(TurnOrders {
+        milling,
+        orders,
+        std,
+        mean,
+        zero_is_known,
+        over_noise,
+        air_power,
+    })
+}
+
+fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
+    if is_noise(&of_turn.over_noise) {
         notices.push(Notice {
             kind: NOTHING_REPEATS,
             detail: String::new(),
         });
         return;
     }
-    let std = variance.map(|v| v.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
-    let orders = [0, 1].map(|axis| orders[axis].as_slice());
-    let std = [0, 1].map(|axis| std[axis].as_slice());
+    let (milling, mean, zero_is_known) = (&of_turn.milling, of_turn.mean, of_turn.zero_is_known);
+    let orders = [0, 1].map(|axis| of_turn.orders[axis].as_slice());
+    let std = [0, 1].map(|axis| of_turn.std[axis].as_slice());
     if !milling.places.is_empty() {
-        let other = other_than_listed(&milling, orders, std, mean, zero_is_known);
+        let other = other_than_listed(milling, orders, std, mean, zero_is_known);
         if let Some(other) = other {
             notices.push(Notice {
                 kind: OTHER_TEETH,
@@ -545,7 +685,7 @@ fn teeth_notice<S: Sample>(
         return;
     }
     let known_mean = zero_is_known.then_some(mean);
-    let slow = tooth_passing_too_weak(&milling, orders, std, known_mean);
+    let slow = tooth_passing_too_weak(milling, orders, std, known_mean);
     if let Some(slow) = slow {
         notices.push(Notice {
             kind: OTHER_MULTIPLE,
@@ -563,7 +703,7 @@ fn teeth_notice<S: Sample>(
         });
         return;
     }
-    if let Some(part) = idle_tooth(&milling, orders, mean, zero_is_known) {
+    if let Some(part) = idle_tooth(milling, orders, mean, zero_is_known) {
         let n = milling.teeth as f64;
         let strongest = (1..milling.teeth)
             .max_by(|a, b| {
@@ -607,7 +747,7 @@ fn teeth_notice<S: Sample>(
         });
         return;
     }
-    let back = tooth_back_mm(&milling, orders, std, mean, zero_is_known);
+    let back = tooth_back_mm(milling, orders, std, mean, zero_is_known);
     if let Some(back) = back {
         notices.push(Notice {
             kind: if milling.teeth < 4 {
@@ -636,6 +776,10 @@ fn duration_notice(cut: &Cut, tool: &Tool, phases: &Phases, rate: f64, notices: 
         return;
     };
     let expected_s = (g.entry_travel_mm() + depth) / (g.feed_per_rev_mm * cut.spindle_rpm / 60.0);
+    // Of pecks, what is drilled again and again between them is not known.
+    if !phases.passes.is_empty() {
+        return;
+    }
     let took_s = phases.cutting.len() as f64 / rate;
     // A dwell at the bottom is usual; half the time again is not.
     if expected_s.is_finite() && !(0.9..1.5).contains(&(took_s / expected_s)) {
@@ -837,7 +981,8 @@ mod tests {
         };
         // The last third against the first: two thirds of the growth.
         assert_eq!(told(0.3).as_deref(), Some("by +17 %"));
-        assert_eq!(told(0.1), None);
+        assert_eq!(told(0.1).as_deref(), Some("by +6 %"));
+        assert_eq!(told(0.05), None);
     }
 
     /// A slot milled by two teeth of a straight edge; `share`: of the common chip that each tooth takes.

@@ -230,6 +230,44 @@ pub(crate) fn tooth_back_mm(
     (told && back.is_finite()).then_some(back)
 }
 
+/// Root mean square over the teeth of ρ_j − ρ_(j−1), mm: by how much their chips differ from the common one, while every tooth cuts (see
+/// [`tooth_back_mm`]); by Parseval's theorem Σ |D_k|² = N Σ (ρ_j − ρ_(j−1))². `None` where that does not stand above the noise. What
+/// turns with the spindle in the air as well (`air_power` of orders from 1 on, N²) is no tooth.
+pub(crate) fn uneven_chip_mm(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    (mean, zero_is_known): ([f64; 2], bool),
+    air_power: &[f64],
+) -> Option<f64> {
+    let teeth = cut.teeth;
+    if teeth < 2 || orders.iter().any(|o| o.len() < teeth) || std.iter().any(|s| s.len() < teeth) {
+        return None;
+    }
+    let n = teeth as f64;
+    let unit = single_tooth(cut).closed_form(teeth);
+    let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
+    let even_chip = |k: usize| -> f64 {
+        let axis = |axis: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
+        axis(0) + axis(1)
+    };
+    let strongest = (1..=teeth).map(even_chip).fold(0.0, f64::max);
+    let (mut sum, mut noise) = (0.0, 0.0);
+    for k in 1..teeth {
+        // |D_k| = |D_(N−k)|: both orders together.
+        let gain = even_chip(k) + even_chip(teeth - k);
+        if gain <= WEAK * strongest {
+            continue;
+        }
+        let of = |k: usize| power_of(orders, k) - air_power.get(k - 1).copied().unwrap_or(0.0);
+        let of_noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
+        sum += (of(k) + of(teeth - k)).max(0.0) / gain;
+        noise += (of_noise(k) + of_noise(teeth - k)) / gain;
+    }
+    let uneven = (sum - noise).max(0.0).sqrt() / n;
+    (sum > CERTAIN * CERTAIN * noise && uneven.is_finite()).then_some(uneven)
+}
+
 /// Of what comes back once per turn and not once per tooth, N (root of the sum of the squares of the amplitudes).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct AgainstList {
@@ -408,6 +446,41 @@ mod tests {
             shape: None,
             places: Vec::new(),
         }
+    }
+
+    /// Three teeth with radii of their own, all cutting: the root mean square of the differences comes back from the orders, less what
+    /// the air has of them.
+    #[test]
+    fn differences_of_chips_come_back_from_the_orders() {
+        let mut own = cut(3, 40.0, 140.0);
+        own.places = own.places_or_even();
+        let radii = [0.0, 0.012, -0.004];
+        own.places
+            .iter_mut()
+            .zip(radii)
+            .for_each(|(p, r)| p.radius_mm = r);
+        let squares: f64 = (0..3).map(|j| (radii[(j + 1) % 3] - radii[j]).powi(2)).sum();
+        let unit = own.linear(3);
+        let force = |axis: usize, k: usize| unit[0][axis][k] * 1500.0 + unit[1][axis][k] * 450.0;
+        let orders = [0, 1].map(|axis| (1..=3).map(|k| force(axis, k)).collect::<Vec<_>>());
+        let mean = [force(0, 0).re, force(1, 0).re];
+        let found = |noise: f64, air: &[f64]| {
+            let std = vec![noise; 3];
+            let orders = [orders[0].as_slice(), orders[1].as_slice()];
+            uneven_chip_mm(&cut(3, 40.0, 140.0), orders, [&std, &std], (mean, true), air)
+        };
+        let chip = (squares / 3.0).sqrt();
+        approx::assert_relative_eq!(found(1e-6, &[]).unwrap(), chip, max_relative = 0.02);
+        // Half of the power is unbalance.
+        let half: Vec<f64> = (0..3)
+            .map(|k| 0.5 * (orders[0][k].norm_sqr() + orders[1][k].norm_sqr()))
+            .collect();
+        approx::assert_relative_eq!(
+            found(1e-6, &half).unwrap(),
+            chip * 0.5f64.sqrt(),
+            max_relative = 0.02
+        );
+        assert_eq!(found(1e3, &[]), None);
     }
 
     /// One tooth of four missing: told by the right list, by one with its neighbour missing as well, and where none is missing.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm};
+use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm, record_at_full_contact};
 use crate::data::{ChannelRole, Cut, Immersion, Process, Sample, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::identify::forces::asynchronous_lines::{
@@ -103,6 +103,14 @@ impl CutData {
         record: &TimeRecord<S>,
         analysis: &CutAnalysis,
     ) -> Result<CutData> {
+        let whole;
+        let record = match analysis.contact_share < 1.0 {
+            true => {
+                whole = record_at_full_contact(record, analysis);
+                &whole
+            }
+            false => record,
+        };
         let rate = record.sample_rate_hz;
         let per_turn = rate * 60.0 / cut.spindle_rpm;
         let window = Windows::new(analysis, record, per_turn);

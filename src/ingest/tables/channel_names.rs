@@ -329,14 +329,101 @@ pub(crate) fn is_known(name: &str) -> bool {
         || turning_force(name).is_some()
 }
 
+/// The sensors of a dynamometer with four three-component sensors, as its eight raw channels bring them out: x and y of two together, z
+/// of each.
+const SENSORS: [(ChannelRole, &str, &[&str]); 3] = [
+    (ChannelRole::ForceX, "fx", &["12", "34"]),
+    (ChannelRole::ForceY, "fy", &["14", "23"]),
+    (ChannelRole::ForceZ, "fz", &["1", "2", "3", "4"]),
+];
+
+/// The sensors that a name ends with: `12` of `Fx1+2`, `Dyno Fx12 [N]`, `Fx_1+2`.
+fn sensors_of<'a>(name: &str, axis: &str, sensors: &[&'a str]) -> Option<&'a str> {
+    let base = split_unit(name).0.to_lowercase();
+    let letters: String = base.chars().filter(|c| c.is_alphanumeric()).collect();
+    let digits = &letters[letters.rfind(axis)? + axis.len()..];
+    sensors.iter().copied().find(|s| *s == digits)
+}
+
+fn is_sensor(channel: &Channel) -> bool {
+    SENSORS
+        .iter()
+        .any(|(_, axis, sensors)| sensors_of(&channel.name, axis, sensors).is_some())
+}
+
+/// Forces of which a record has the parts, each from one sensor or two, are their sums. A part is no force by itself. Whether there are
+/// such parts.
+fn add_up_sensors(channels: &mut Vec<Channel>, notes: &mut Notes) -> bool {
+    let parts_of = |channels: &[Channel], axis: &str, sensors: &[&str]| -> Vec<usize> {
+        let each = sensors.iter().map(|own| {
+            let is_it = |c: &Channel| sensors_of(&c.name, axis, sensors) == Some(*own);
+            let mut found = channels
+                .iter()
+                .enumerate()
+                .filter(|(_, c)| is_it(c))
+                .map(|(i, _)| i);
+            found.next().filter(|_| found.next().is_none())
+        });
+        each.collect::<Option<Vec<usize>>>().unwrap_or_default()
+    };
+    // `Fz1` to `Fz4` alone may be of four cuts.
+    if SENSORS[..2]
+        .iter()
+        .all(|(_, axis, sensors)| parts_of(channels, axis, sensors).is_empty())
+    {
+        return false;
+    }
+    for (role, axis, sensors) in SENSORS {
+        let is_part = |c: &Channel| sensors_of(&c.name, axis, sensors).is_some();
+        let parts = parts_of(channels, axis, sensors);
+        channels
+            .iter_mut()
+            .filter(|c| c.role == role && is_part(c))
+            .for_each(|c| c.role = ChannelRole::Other);
+        let unit = |i: usize| channels[i].file_unit.clone();
+        let length = parts
+            .iter()
+            .map(|i| channels[*i].samples.len())
+            .min()
+            .unwrap_or(0);
+        if parts.is_empty() || channels.iter().any(|c| c.role == role) {
+            continue;
+        }
+        if parts.iter().any(|i| unit(*i) != unit(parts[0])) {
+            notes.file(format!(
+                "the parts of {} have several units and are not added up",
+                text_of(channels, &parts)
+            ));
+            continue;
+        }
+        let sum = |at: usize| parts.iter().map(|i| channels[*i].samples[at]).sum();
+        let whole = Channel {
+            name: text_of(channels, &parts),
+            file_unit: unit(parts[0]),
+            role,
+            samples: (0..length).map(sum).collect(),
+        };
+        notes.about(&whole.name, "sensors of one dynamometer: added up to the force");
+        channels.push(whole);
+    }
+    true
+}
+
+/// `Fx1+2 + Fx3+4`, the names of these channels without their units.
+fn text_of(channels: &[Channel], parts: &[usize]) -> String {
+    let names: Vec<&str> = parts.iter().map(|i| split_unit(&channels[*i].name).0).collect();
+    names.join(" + ")
+}
+
 /// Gives roles to the channels of a record that only a part of their name tells, where nobody else has them; and tells it.
-pub(crate) fn settle(channels: &mut [Channel], notes: &mut Notes) {
+pub(crate) fn settle(channels: &mut Vec<Channel>, notes: &mut Notes) {
     const ROLES: [(ChannelRole, &str); 4] = [
         (ChannelRole::ForceX, "Fx"),
         (ChannelRole::ForceY, "Fy"),
         (ChannelRole::ForceZ, "Fz"),
         (ChannelRole::TorqueZ, "Mz"),
     ];
+    let has_sensors = add_up_sensors(channels, notes);
     let unit = |c: &Channel| units::parse_named(&c.file_unit).or_else(|| unit_in_name(&c.name));
     let open = |c: &Channel, role: ChannelRole| c.role == ChannelRole::Other && fits(role, unit(c));
     for (role, label) in ROLES {
@@ -351,7 +438,9 @@ pub(crate) fn settle(channels: &mut [Channel], notes: &mut Notes) {
         if channels.iter().any(|c| c.role == role) {
             continue;
         }
-        let mine = |c: &&mut Channel| open(c, role) && role_in(&c.name) == Some(role);
+        let mine = |c: &&mut Channel| {
+            open(c, role) && role_in(&c.name) == Some(role) && !(has_sensors && is_sensor(c))
+        };
         let mut mine: Vec<&mut Channel> = channels.iter_mut().filter(mine).collect();
         match mine.as_mut_slice() {
             [] => {}
@@ -477,6 +566,45 @@ mod tests {
             samples: Vec::new(),
         };
         names.iter().map(channel).collect()
+    }
+
+    #[test]
+    fn the_sensors_of_a_dynamometer_are_added_up() {
+        use ChannelRole::{ForceX, ForceY, ForceZ, Other};
+        let names = [
+            "Fx1+2", "Fx3+4", "Fy14 [N]", "Fy23 [N]", "Fz1", "Fz2", "Fz3", "Fz4",
+        ];
+        let mut all = channels(&names);
+        for (i, channel) in all.iter_mut().enumerate() {
+            channel.samples = vec![i as f64, 10.0];
+        }
+        let mut notes = Notes::default();
+        settle(&mut all, &mut notes);
+        let told = notes.into_warnings().join("\n");
+        assert!(told.contains("Fz1 + Fz2 + Fz3 + Fz4"), "{told}");
+        let of = |role| {
+            all.iter()
+                .filter(|c| c.role == role)
+                .map(|c| c.samples.clone())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(of(ForceX), [[1.0, 20.0]]);
+        assert_eq!(of(ForceY), [[5.0, 20.0]]);
+        assert_eq!(of(ForceZ), [[22.0, 40.0]]);
+        assert_eq!(of(Other).len(), 8);
+        // Once more changes nothing: long files are read in pieces and looked at again as a whole.
+        settle(&mut all, &mut Notes::default());
+        assert_eq!(all.len(), 11);
+        // One of four is not the force.
+        let mut some = channels(&["Fx12", "Fx34", "Fy", "Fz1"]);
+        settle(&mut some, &mut Notes::default());
+        assert_eq!(
+            some.iter().map(|c| c.role).collect::<Vec<_>>(),
+            [Other, Other, ForceY, Other, ForceX]
+        );
+        let mut cuts = channels(&["Fz1", "Fz2", "Fz3", "Fz4"]);
+        settle(&mut cuts, &mut Notes::default());
+        assert_eq!(cuts.len(), 4);
     }
 
     #[test]

@@ -74,7 +74,7 @@ pub(crate) fn collect(
     let mut elsewhere_hz = Vec::new();
     let parts = verify::parts_of_others(fitted, groups);
     let complex_modes = verify::complex_modes(fitted, groups);
-    let (mut movements, mut moved_hz, mut complex_hz) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut movements, mut moved, mut complex_hz) = (Vec::new(), Vec::new(), Vec::new());
     let lines_hz = || data.iter().flat_map(|d| d.frequency_hz.iter().copied());
     let (first_hz, last_hz) = (
         lines_hz().fold(f64::INFINITY, f64::min),
@@ -167,7 +167,6 @@ pub(crate) fn collect(
             let others: Vec<Pole> = poles.iter().filter(|p| *p != pole).copied().collect();
             let moves = verify::moves(fitted, solution, j, *pole, &others);
             let (mut frequency_hz, mut damping_ratio) = (pole.frequency_hz, pole.damping_ratio);
-            let moves_much = moves.as_ref().is_some_and(|m| m.significant);
             if let Some(moves) = moves {
                 scatters.push(moves.scatter);
                 moving += usize::from(moves.significant);
@@ -255,10 +254,7 @@ pub(crate) fn collect(
             }
             let movement = verify::movement(solution, j);
             movements.extend(movement);
-            moved_hz.push(match moves_much {
-                true => 0.0,
-                false => movement.map_or(0.0, |m| m.scatter) * frequency_hz,
-            });
+            moved.push(movement.map(|m| m.scatter));
             result.modes.push(GlobalMode {
                 frequency_hz,
                 damping_ratio,
@@ -274,7 +270,10 @@ pub(crate) fn collect(
     }
     let moves_slightly = verify::set_moves(&movements);
     if moves_slightly.is_some() {
-        for (mode, moved_hz) in result.modes.iter_mut().zip(moved_hz) {
+        // A mode that few FRFs tell of moves as the others do.
+        let usual = crate::signal::median(&moved.iter().copied().flatten().collect::<Vec<f64>>());
+        for (mode, own) in result.modes.iter_mut().zip(moved) {
+            let moved_hz = own.unwrap_or(usual) * mode.frequency_hz;
             mode.frequency_std_hz = mode.frequency_std_hz.hypot(UNLOADED * moved_hz);
         }
     }
@@ -353,6 +352,10 @@ pub(crate) fn collect(
     left_out_hz.sort_by(f64::total_cmp);
     if !result.modes.is_empty() {
         let much = moving > 0 && 2 * moving >= scatters.len();
+        // What a pole leaves that moves from FRF to FRF is told as movement.
+        if much || moves_slightly.is_some() {
+            left_out_hz.clear();
+        }
         let doubts = groups.iter().filter(|g| g.doubt.is_some()).count();
         let found = quality::SetFindings {
             power,

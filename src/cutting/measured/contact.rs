@@ -26,7 +26,7 @@ const UNSURE_OF_BETWEEN: f64 = 0.25;
 
 /// Of a turn, the part in which the edge cuts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Contact {
+pub(crate) struct TurnContact {
     pub share: f64,
     /// Standard error of `share`.
     pub std: f64,
@@ -34,7 +34,7 @@ pub(crate) struct Contact {
 
 /// How much of each turn the edge cuts, from the `samples` of the channel that carries most of the force, less its zero; `None` where it
 /// does not leave the work.
-pub(crate) fn interrupted(samples: &[f64], samples_per_turn: f64) -> Option<Contact> {
+pub(crate) fn interrupted(samples: &[f64], samples_per_turn: f64) -> Option<TurnContact> {
     let turns = (samples.len() as f64 / samples_per_turn + 1e-6).floor() as usize;
     let sign = samples.iter().sum::<f64>().signum();
     let force = quantile(samples.iter().map(|v| sign * v), CUTTING_QUANTILE)?;
@@ -50,14 +50,14 @@ pub(crate) fn interrupted(samples: &[f64], samples_per_turn: f64) -> Option<Cont
     let edge = |k: usize| ((k as f64 * samples_per_turn).round() as usize).min(samples.len());
     let with_air = (0..turns).filter(|k| share(&samples[edge(*k)..edge(k + 1)], &is_out) > HALF * out);
     let every_turn = with_air.count() as f64 >= NEARLY_EVERY_TURN * turns as f64;
-    (SHARE_OF_AIR.contains(&out) && between < FEW_BETWEEN * out && every_turn).then_some(Contact {
+    (SHARE_OF_AIR.contains(&out) && between < FEW_BETWEEN * out && every_turn).then_some(TurnContact {
         share: 1.0 - out,
         std: UNSURE_OF_BETWEEN * between,
     })
 }
 
 /// `channels` with the means of the part of the turn in which the edge cuts.
-pub(crate) fn at_full_contact(channels: &mut [ChannelAnalysis], contact: Contact) {
+pub(crate) fn at_full_contact(channels: &mut [ChannelAnalysis], contact: TurnContact) {
     for mean in channels.iter_mut().map(|c| &mut c.mean) {
         let unsure = mean.average.value * contact.std / contact.share;
         mean.average.value /= contact.share;

@@ -10,7 +10,7 @@ use crate::cutting::force_model::drill_geometry::DrillGeometry;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::{air_notices, believable_air};
 use crate::cutting::measured::average::average;
-use crate::cutting::measured::contact::{Contact, INTERRUPTED, at_full_contact, interrupted};
+use crate::cutting::measured::contact::{INTERRUPTED, TurnContact, at_full_contact, interrupted};
 use crate::cutting::measured::cut_analysis::{
     ChannelAnalysis, CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, Trace, WRONG_SPEED, in_tool_axes,
 };
@@ -474,7 +474,7 @@ fn contact<S: Sample>(
     steady: &Range<usize>,
     samples_per_turn: f64,
     record: &TimeRecord<S>,
-) -> Option<Contact> {
+) -> Option<TurnContact> {
     let forces = channels
         .iter()
         .zip(usable)

@@ -68,11 +68,6 @@ impl Solution {
         (self.misfit / self.degrees_of_freedom as f64).max(1.0).sqrt()
     }
 
-    /// The poles that took part without being moved.
-    pub fn fixed(&self) -> &[Pole] {
-        &self.fixed
-    }
-
     /// Number of FRFs that took part: whose bands reach into the window.
     pub fn taking_part(&self) -> usize {
         self.frfs.iter().filter(|f| f.took_part()).count()

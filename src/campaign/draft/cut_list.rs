@@ -323,7 +323,6 @@ fn in_key_unit(cell: &str, head: &str, factor: f64, key: &str) -> std::result::R
     let no_number = || format!("{:?} is no number", shown(cell));
     let begins = |c: char| c.is_ascii_digit() || "+-.,".contains(c);
     let text = cell.trim_start_matches(|c: char| "Øø⌀= ".contains(c));
-    let is_gap = |c: char| c.is_whitespace() || "'’".contains(c);
     let end = text
         .find(|c: char| !begins(c) && !is_gap(c))
         .unwrap_or(text.len());
@@ -361,9 +360,13 @@ fn in_key_unit(cell: &str, head: &str, factor: f64, key: &str) -> std::result::R
     })
 }
 
+/// May it stand between thousands?
+fn is_gap(c: char) -> bool {
+    c.is_whitespace() || "'’".contains(c)
+}
+
 /// A number without the marks between its thousands; `None` where they stand elsewhere.
 fn without_gaps(number: &str) -> Option<String> {
-    let is_gap = |c: char| c.is_whitespace() || "'’".contains(c);
     let mut groups = number.split(is_gap);
     let first = groups.next().unwrap_or("");
     let has_three = |group: &str| {

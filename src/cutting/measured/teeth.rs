@@ -121,7 +121,7 @@ pub(crate) fn tooth_passing_too_weak(
         }
     }
     let power = |k: usize| power_of(orders, k);
-    let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
+    let noise = |k: usize| noise_of(std, k);
     let (once, twice) = (power(teeth), power(2 * teeth));
     // What noise hides of the tooth passing is granted it.
     let measured = (twice / (once + noise(teeth))).sqrt();
@@ -158,7 +158,7 @@ pub(crate) fn parts_of_turn(
     zero_is_known: bool,
 ) -> Option<usize> {
     let power = |k: usize| power_of(orders, k);
-    let noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
+    let noise = |k: usize| noise_of(std, k);
     let count = orders.iter().map(|o| o.len()).min()?;
     let strongest_of_all = (1..=count).map(power).fold(0.0, f64::max);
     (2..teeth).rev().filter(|m| teeth.is_multiple_of(*m)).find(|m| {
@@ -197,28 +197,18 @@ pub(crate) fn tooth_back_mm(
     zero_is_known: bool,
 ) -> Option<f64> {
     let teeth = cut.teeth;
-    if teeth < 2 || orders.iter().any(|o| o.len() < teeth) || std.iter().any(|s| s.len() < teeth) {
-        return None;
-    }
-    let n = teeth as f64;
-    let unit = single_tooth(cut).closed_form(teeth);
-    let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
-    let even_chip = |k: usize| -> f64 {
-        let axis = |axis: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
-        axis(0) + axis(1)
-    };
-    let strongest = (1..=teeth).map(even_chip).fold(0.0, f64::max);
+    let even_chip = power_of_even_chip(cut, orders, std, mean, zero_is_known)?;
+    let strongest = even_chip.iter().skip(1).copied().fold(0.0, f64::max);
     let tell = if teeth < 4 { 1..teeth } else { 2..teeth - 1 };
     let (mut power, mut noise, mut of_tooth) = (0.0, 0.0, 0.0);
     for k in tell {
-        let gain = even_chip(k);
+        let gain = even_chip[k];
         if gain <= WEAK * strongest {
             continue;
         }
-        let square = |values: [f64; 2]| values.iter().map(|v| v * v).sum::<f64>();
         power += power_of(orders, k) / gain;
-        noise += square([std[0][k - 1], std[1][k - 1]]) / gain;
-        of_tooth += 2.0 - 2.0 * (TAU * k as f64 / n).cos();
+        noise += noise_of(std, k) / gain;
+        of_tooth += 2.0 - 2.0 * (TAU * k as f64 / teeth as f64).cos();
     }
     let back = (power / of_tooth).sqrt();
     let part = if teeth < 4 {
@@ -241,30 +231,20 @@ pub(crate) fn uneven_chip_mm(
     air_power: &[f64],
 ) -> Option<f64> {
     let teeth = cut.teeth;
-    if teeth < 2 || orders.iter().any(|o| o.len() < teeth) || std.iter().any(|s| s.len() < teeth) {
-        return None;
-    }
-    let n = teeth as f64;
-    let unit = single_tooth(cut).closed_form(teeth);
-    let (k_t, k_r) = direction(&unit, n, orders, mean, zero_is_known)?;
-    let even_chip = |k: usize| -> f64 {
-        let axis = |axis: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
-        axis(0) + axis(1)
-    };
-    let strongest = (1..=teeth).map(even_chip).fold(0.0, f64::max);
+    let even_chip = power_of_even_chip(cut, orders, std, mean, zero_is_known)?;
+    let strongest = even_chip.iter().skip(1).copied().fold(0.0, f64::max);
     let (mut sum, mut noise) = (0.0, 0.0);
     for k in 1..teeth {
         // |D_k| = |D_(N−k)|: both orders together.
-        let gain = even_chip(k) + even_chip(teeth - k);
+        let gain = even_chip[k] + even_chip[teeth - k];
         if gain <= WEAK * strongest {
             continue;
         }
         let of = |k: usize| power_of(orders, k) - air_power.get(k - 1).copied().unwrap_or(0.0);
-        let of_noise = |k: usize| std.iter().map(|s| s[k - 1].powi(2)).sum::<f64>();
         sum += (of(k) + of(teeth - k)).max(0.0) / gain;
-        noise += (of_noise(k) + of_noise(teeth - k)) / gain;
+        noise += (noise_of(std, k) + noise_of(std, teeth - k)) / gain;
     }
-    let uneven = (sum - noise).max(0.0).sqrt() / n;
+    let uneven = (sum - noise).max(0.0).sqrt() / teeth as f64;
     (sum > CERTAIN * CERTAIN * noise && uneven.is_finite()).then_some(uneven)
 }
 
@@ -379,6 +359,30 @@ fn power_of(orders: [&[Complex64]; 2], k: usize) -> f64 {
     orders.iter().map(|o| o[k - 1].norm_sqr()).sum()
 }
 
+/// Variance of that, N².
+fn noise_of(std: [&[f64]; 2], k: usize) -> f64 {
+    std.iter().map(|s| s[k - 1].powi(2)).sum()
+}
+
+/// Powers of orders 0 to the number of teeth of a chip of 1 mm all along its way, cut by one tooth with the force that the `mean` (N) tells,
+/// N². `None` for a single tooth, or where an order is missing.
+fn power_of_even_chip(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<Vec<f64>> {
+    let teeth = cut.teeth;
+    if teeth < 2 || orders.iter().any(|o| o.len() < teeth) || std.iter().any(|s| s.len() < teeth) {
+        return None;
+    }
+    let unit = single_tooth(cut).closed_form(teeth);
+    let (k_t, k_r) = direction(&unit, teeth as f64, orders, mean, zero_is_known)?;
+    let of_axis = |axis: usize, k: usize| (unit[3][axis][k] * k_t + unit[4][axis][k] * k_r).norm_sqr();
+    Some((0..=teeth).map(|k| of_axis(0, k) + of_axis(1, k)).collect())
+}
+
 /// The same of a chip that is cut with so much tangential and radial force.
 fn power_of_chip(unit: &UnitForces, k: usize, (k_t, k_r): (f64, f64)) -> f64 {
     let axis = |axis: usize| (unit[0][axis][k] * k_t + unit[1][axis][k] * k_r).norm_sqr();
@@ -430,23 +434,8 @@ fn direction(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutting::made_tools::milling_cut as cut;
     use crate::cutting::waveform::{TeethSlopes, ToothPlace};
-    use crate::data::Immersion;
-
-    fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
-        MillingCut {
-            teeth,
-            feed_per_tooth_mm: 0.1,
-            axial_depth_mm: 2.0,
-            immersion: Immersion {
-                start_rad: start_deg.to_radians(),
-                exit_rad: exit_deg.to_radians(),
-            },
-            lag_rad: 0.15,
-            shape: None,
-            places: Vec::new(),
-        }
-    }
 
     /// Three teeth with radii of their own, all cutting: the root mean square of the differences comes back from the orders, less what
     /// the air has of them.

@@ -38,21 +38,13 @@ impl UnevenTeeth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Immersion;
+    use crate::cutting::made_tools::milling_cut;
     use approx::assert_relative_eq;
 
     fn cut(teeth: usize, start_deg: f64, exit_deg: f64) -> MillingCut {
         MillingCut {
-            teeth,
-            feed_per_tooth_mm: 0.1,
-            axial_depth_mm: 2.0,
-            immersion: Immersion {
-                start_rad: start_deg.to_radians(),
-                exit_rad: exit_deg.to_radians(),
-            },
             lag_rad: 0.0,
-            shape: None,
-            places: Vec::new(),
+            ..milling_cut(teeth, start_deg, exit_deg)
         }
     }
 

@@ -337,34 +337,36 @@ const SENSORS: [(ChannelRole, &str, &[&str]); 3] = [
     (ChannelRole::ForceZ, "fz", &["1", "2", "3", "4"]),
 ];
 
-/// The sensors that a name ends with: `12` of `Fx1+2`, `Dyno Fx12 [N]`, `Fx_1+2`.
-fn sensors_of<'a>(name: &str, axis: &str, sensors: &[&'a str]) -> Option<&'a str> {
+/// The figures that a name ends with behind its axis: `12` of `Fx1+2`, `Dyno Fx12 [N]`, `Fx_1+2`; blank of `Fx`.
+fn figures_behind(name: &str, axis: &str) -> Option<String> {
     let base = split_unit(name).0.to_lowercase();
     let letters: String = base.chars().filter(|c| c.is_alphanumeric()).collect();
-    let digits = &letters[letters.rfind(axis)? + axis.len()..];
-    sensors.iter().copied().find(|s| *s == digits)
+    let rest = &letters[letters.rfind(axis)? + axis.len()..];
+    rest.bytes().all(|b| b.is_ascii_digit()).then(|| rest.to_string())
 }
 
 fn is_sensor(channel: &Channel) -> bool {
-    SENSORS
-        .iter()
-        .any(|(_, axis, sensors)| sensors_of(&channel.name, axis, sensors).is_some())
+    SENSORS.iter().any(|(_, axis, sensors)| {
+        figures_behind(&channel.name, axis).is_some_and(|f| sensors.contains(&f.as_str()))
+    })
 }
 
 /// Forces of which a record has the parts, each from one sensor or two, are their sums. A part is no force by itself. Whether there are
 /// such parts.
 fn add_up_sensors(channels: &mut Vec<Channel>, notes: &mut Notes) -> bool {
     let parts_of = |channels: &[Channel], axis: &str, sensors: &[&str]| -> Vec<usize> {
-        let each = sensors.iter().map(|own| {
-            let is_it = |c: &Channel| sensors_of(&c.name, axis, sensors) == Some(*own);
-            let mut found = channels
-                .iter()
-                .enumerate()
-                .filter(|(_, c)| is_it(c))
-                .map(|(i, _)| i);
-            found.next().filter(|_| found.next().is_none())
-        });
-        each.collect::<Option<Vec<usize>>>().unwrap_or_default()
+        let figures: Vec<Option<String>> = channels.iter().map(|c| figures_behind(&c.name, axis)).collect();
+        let found: Vec<usize> = (0..channels.len())
+            .filter(|i| figures[*i].as_ref().is_some_and(|f| !f.is_empty()))
+            .collect();
+        let place = |i: &usize| sensors.iter().position(|s| figures[*i].as_deref() == Some(*s));
+        let mut places: Vec<Option<usize>> = found.iter().map(place).collect();
+        places.sort_unstable();
+        // Each once and no other: `Fx12` among `Fx1` to `Fx40` is one of forty cuts.
+        match places.into_iter().eq((0..sensors.len()).map(Some)) {
+            true => found,
+            false => Vec::new(),
+        }
     };
     // `Fz1` to `Fz4` alone may be of four cuts.
     if SENSORS[..2]
@@ -374,11 +376,10 @@ fn add_up_sensors(channels: &mut Vec<Channel>, notes: &mut Notes) -> bool {
         return false;
     }
     for (role, axis, sensors) in SENSORS {
-        let is_part = |c: &Channel| sensors_of(&c.name, axis, sensors).is_some();
         let parts = parts_of(channels, axis, sensors);
         channels
             .iter_mut()
-            .filter(|c| c.role == role && is_part(c))
+            .filter(|c| c.role == role && is_sensor(c))
             .for_each(|c| c.role = ChannelRole::Other);
         let unit = |i: usize| channels[i].file_unit.clone();
         let length = parts
@@ -605,6 +606,11 @@ mod tests {
         let mut cuts = channels(&["Fz1", "Fz2", "Fz3", "Fz4"]);
         settle(&mut cuts, &mut Notes::default());
         assert_eq!(cuts.len(), 4);
+        // Nor are two of forty cuts.
+        let forty: Vec<String> = (1..=40).map(|i| format!("Fx{i}")).collect();
+        let mut cuts = channels(&forty.iter().map(String::as_str).collect::<Vec<_>>());
+        settle(&mut cuts, &mut Notes::default());
+        assert_eq!(cuts.len(), 40);
     }
 
     #[test]

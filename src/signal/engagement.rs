@@ -201,11 +201,14 @@ pub(super) fn plateau(
         };
         levels.push((0..turns).map(turn).collect());
     }
+    // What lies before contact and after it, where no air was found, is no level of the cut.
+    let carries = |k: &usize| levels.iter().any(|v| v[*k].abs() >= OUT_OF_WORK);
+    let turns = (0..turns).find(carries)?..(0..turns).rfind(carries)? + 1;
     // The way in and out is no other level.
-    let ends = turns / ENDS;
-    let between = |values: &Vec<f64>, share: f64| {
-        quantile(values[ends..turns - ends].iter().copied(), share).unwrap_or(0.0)
-    };
+    let ends = turns.len() / ENDS;
+    let inner = turns.start + ends..turns.end - ends;
+    let between =
+        |values: &Vec<f64>, share: f64| quantile(values[inner.clone()].iter().copied(), share).unwrap_or(0.0);
     let range = levels.iter().map(|v| between(v, 0.95) - between(v, 0.05));
     let range = range.fold(0.0, f64::max);
     if range < ONE_LEVEL {
@@ -220,18 +223,18 @@ pub(super) fn plateau(
                 *high - *low < ONE_LEVEL
             })
         };
-        (from..turns).take_while(stays).count()
+        (from..turns.end).take_while(stays).count()
     };
     let mut best = 0..0;
-    let mut from = 0;
-    while from + best.len() < turns {
+    let mut from = turns.start;
+    while from + best.len() < turns.end {
         let length = run_from(from);
         if length > best.len() {
             best = from..from + length;
         }
         from += 1;
     }
-    let share = best.len() as f64 / turns as f64;
+    let share = best.len() as f64 / turns.len() as f64;
     let of_a_ramp = ONE_LEVEL / range;
     let least = of_a_ramp + PLATEAU * (1.0 - of_a_ramp);
     (share < SHARE_OF_ALL && share > SHARE_OF_PLATEAU.max(least))
@@ -352,6 +355,11 @@ mod tests {
             .map(|i| (0.2 * (i + 1).min(90 - i) as f64).min(1.0))
             .collect();
         assert_eq!(stays(&quick), None);
+        // A real record: a zero that has not come back after the cut was found to be no air.
+        let beyond: Vec<f64> = (0..90).map(|i| if i < 60 { 1.0 } else { 0.04 }).collect();
+        assert_eq!(stays(&beyond), None);
+        let step_and_beyond: Vec<f64> = step.iter().copied().chain([0.04; 20]).collect();
+        assert_eq!(stays(&step_and_beyond), Some(40..100));
         let little: Vec<f64> = (0..90).map(|i| if i < 30 { 1.0 } else { 1.1 }).collect();
         assert_eq!(stays(&little), None);
     }

@@ -249,6 +249,8 @@ pub(super) struct SetFindings {
     pub frequency_scatter: Option<f64>,
     /// Most modes move from FRF to FRF.
     pub moving: bool,
+    /// Poles that were left out where the modes leave much unexplained, Hz.
+    pub left_out_hz: Vec<f64>,
     /// Modes that there may be besides.
     pub doubts: usize,
     /// Modes that the FRFs by themselves put elsewhere than the common fit, Hz.
@@ -312,6 +314,17 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             format!(
                 "your frequencies move from FRF to FRF by {} %: mass loading or temperature",
                 figures(100.0 * found.frequency_scatter.unwrap_or(0.0), 2)
+            ),
+        );
+    }
+    if !found.left_out_hz.is_empty() {
+        let places: Vec<String> = found.left_out_hz.iter().map(|f| format!("{f:.2}")).collect();
+        note(
+            QualityGrade::Doubtful,
+            format!(
+                "what was left out at {} Hz may be a mode: the others do not explain what was measured there (why it was left out: \
+                 --json)",
+                places.join(", ")
             ),
         );
     }

@@ -68,6 +68,11 @@ impl Solution {
         (self.misfit / self.degrees_of_freedom as f64).max(1.0).sqrt()
     }
 
+    /// The poles that took part without being moved.
+    pub fn fixed(&self) -> &[Pole] {
+        &self.fixed
+    }
+
     /// Number of FRFs that took part: whose bands reach into the window.
     pub fn taking_part(&self) -> usize {
         self.frfs.iter().filter(|f| f.took_part()).count()
@@ -195,6 +200,16 @@ impl Solution {
     pub fn known_constants(&self, mode: usize) -> Vec<Complex64> {
         let each = (0..self.frfs.len()).map(|frf| self.constant(frf, mode));
         each.map(|(value, std)| shape::as_known(value, std)).collect()
+    }
+
+    /// How far a mode, or a pole held in place (these follow the modes), displaces the point of an FRF right after a blow, m/(N·s), up
+    /// to 2π: b of its numerator a + b s.
+    pub fn displaces_at_once(&self, frf: usize, pole: usize) -> f64 {
+        let frequency_hz = match pole.checked_sub(self.poles.len()) {
+            None => self.poles[pole].frequency_hz,
+            Some(held) => self.fixed[held].frequency_hz,
+        };
+        self.frfs[frf].linear[2 * pole + 1] * frequency_hz
     }
 
     /// Squared size of a mode in an FRF against its uncertainty (two degrees of freedom).

@@ -13,7 +13,7 @@ use crate::modal::single::local_fit::Pole;
 use crate::modal::stabilisation::{Candidate, MAX_DAMPING, Stabilisation};
 use crate::modal::together::global_modes::{GlobalMode, GlobalModes, RejectedMode};
 use crate::modal::together::own_places;
-use crate::modal::together::reconstruction::reconstruction;
+use crate::modal::together::reconstruction::{Reconstruction, reconstruction};
 use crate::modal::together::set_member::SetMember;
 use crate::modal::together::verify::{self, Otherwise};
 
@@ -42,16 +42,25 @@ const CLEARLY_HIGH: f64 = 0.05;
 const BEYOND_NOISE: f64 = 1.5;
 /// Of what the mean over the FRFs and the common pole of a mode that moves are apart, this part is uncertainty.
 const BETWEEN: f64 = 0.5;
+/// The frequencies without the sensor's mass are uncertain by so many of the standard deviations that they move by: a mass that goes
+/// round lowers a mode in proportion to φ², and FRFs count in proportion to φ². For a plate's shape, cos·cos, the mean of φ² is then
+/// 2.05 standard deviations of it, for a beam's 3: twice this number.
+const UNLOADED: f64 = 1.5;
+/// Where a pole was left out, the rest is not explained if it is so many times the noise …
+const LEFT_OVER_NOISE: f64 = 3.0;
+/// … and beyond it this share of what was measured there.
+const LEFT_SHARE: f64 = 0.005;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
-/// `fitted`: what the groups were fitted to; `data`: every line with its random noise.
+/// `fitted`: what the groups were fitted to; `data`: every line with its random noise; `tested`: what did not stand the tests.
 pub(crate) fn collect(
     groups: &[Group],
     fitted: &[Data],
     data: &[Data],
     members: &[&SetMember],
     of_member: &[usize],
+    tested: &[RejectedMode],
     result: &mut GlobalModes,
 ) {
     let count = result.reconstructions.len();
@@ -64,6 +73,8 @@ pub(crate) fn collect(
     let (mut scatters, mut moving) = (Vec::new(), 0);
     let mut elsewhere_hz = Vec::new();
     let parts = verify::parts_of_others(fitted, groups);
+    let complex_modes = verify::complex_modes(fitted, groups);
+    let (mut movements, mut moved, mut complex_hz) = (Vec::new(), Vec::new(), Vec::new());
     let lines_hz = || data.iter().flat_map(|d| d.frequency_hz.iter().copied());
     let (first_hz, last_hz) = (
         lines_hz().fold(f64::INFINITY, f64::min),
@@ -238,6 +249,12 @@ pub(crate) fn collect(
                 continue;
             }
             let shape = shape_of(&known, members);
+            if complex_modes.contains(&(g, j)) {
+                complex_hz.push(frequency_hz);
+            }
+            let movement = verify::movement(solution, j);
+            movements.extend(movement);
+            moved.push(movement.map(|m| m.scatter));
             result.modes.push(GlobalMode {
                 frequency_hz,
                 damping_ratio,
@@ -249,6 +266,15 @@ pub(crate) fn collect(
                 shape,
                 constants,
             });
+        }
+    }
+    let moves_slightly = verify::set_moves(&movements);
+    if moves_slightly.is_some() {
+        // A mode that few FRFs tell of moves as the others do.
+        let usual = crate::signal::median(&moved.iter().copied().flatten().collect::<Vec<f64>>());
+        for (mode, own) in result.modes.iter_mut().zip(moved) {
+            let moved_hz = own.unwrap_or(usual) * mode.frequency_hz;
+            mode.frequency_std_hz = mode.frequency_std_hz.hypot(UNLOADED * moved_hz);
         }
     }
     let (own_hz, missed_hz) = by_themselves(members, of_member, result);
@@ -267,24 +293,43 @@ pub(crate) fn collect(
     result
         .modes
         .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    let complex: Vec<String> = result
-        .modes
-        .iter()
-        .filter_map(|m| {
-            let mpc = m.complexity.filter(shape::Complexity::is_low)?.mpc;
-            Some(format!("{:.2} Hz ({mpc:.2})", m.frequency_hz))
-        })
-        .collect();
-    if !complex.is_empty() {
-        result.warnings.push(format!(
-            "complex modes (phase collinearity under {}): {}: two modes taken for one, channels shifted in time, or noise",
-            shape::COLLINEAR,
-            complex.join(", ")
-        ));
+    for (wanted, why) in [
+        (
+            true,
+            "their shapes are complex, and either half of the FRFs has the same (damping at single points, parts that \
+             turn, channels shifted in time)",
+        ),
+        (
+            false,
+            "two modes taken for one, channels shifted in time, or noise",
+        ),
+    ] {
+        let complex: Vec<String> = result
+            .modes
+            .iter()
+            .filter(|m| complex_hz.contains(&m.frequency_hz) == wanted)
+            .filter_map(|m| {
+                let mpc = m.complexity.filter(shape::Complexity::is_low)?.mpc;
+                Some(format!("{:.2} Hz ({mpc:.2})", m.frequency_hz))
+            })
+            .collect();
+        if !complex.is_empty() {
+            result.warnings.push(format!(
+                "complex modes (phase collinearity under {}): {}: {why}",
+                shape::COLLINEAR,
+                complex.join(", ")
+            ));
+        }
     }
     result.mac = mac(&result.modes);
     let where_modes_are = around(&result.modes);
     let mut power = Power::default();
+    let mut unexplained: Vec<(&RejectedMode, LeftThere)> = result
+        .rejected
+        .iter()
+        .chain(tested)
+        .map(|rejected| (rejected, LeftThere::default()))
+        .collect();
     for (m, d) in data.iter().enumerate() {
         let found = reconstruction(d, groups, m, where_modes_are);
         let from = found.frequency_hz.partition_point(|&f| f < where_modes_are[0]);
@@ -294,14 +339,32 @@ pub(crate) fn collect(
             let line = d.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
             (found.frequency_hz[k], measured, measured - fitted, d.sigma[line])
         }));
+        for (rejected, left) in &mut unexplained {
+            left.add(d, &found, rejected);
+        }
         result.reconstructions[of_member[m]] = Some(found);
     }
+    let mut left_out_hz: Vec<f64> = unexplained
+        .iter()
+        .filter(|(_, left)| left.is_much())
+        .map(|(rejected, _)| rejected.frequency_hz)
+        .collect();
+    left_out_hz.sort_by(f64::total_cmp);
     if !result.modes.is_empty() {
+        let much = moving > 0 && 2 * moving >= scatters.len();
+        // What a pole leaves that moves from FRF to FRF is told as movement.
+        if much || moves_slightly.is_some() {
+            left_out_hz.clear();
+        }
         let doubts = groups.iter().filter(|g| g.doubt.is_some()).count();
         let found = quality::SetFindings {
             power,
-            frequency_scatter: (!scatters.is_empty()).then(|| crate::signal::median(&scatters)),
-            moving: moving > 0 && 2 * moving >= scatters.len(),
+            frequency_scatter: match (much, moves_slightly) {
+                (false, Some(scatter)) => Some(scatter),
+                _ => (!scatters.is_empty()).then(|| crate::signal::median(&scatters)),
+            },
+            moving: much || moves_slightly.is_some(),
+            left_out_hz,
             doubts,
             elsewhere_hz,
             own_hz,
@@ -309,6 +372,38 @@ pub(crate) fn collect(
             converged: groups.iter().all(|g| g.solution.converged),
         };
         result.quality = quality::judge_set(&found);
+    }
+}
+
+/// Powers where a pole was left out, in its half-power band, summed over the FRFs.
+#[derive(Default)]
+struct LeftThere {
+    measured: f64,
+    left: f64,
+    noise: f64,
+}
+
+impl LeftThere {
+    fn add(&mut self, data: &Data, found: &Reconstruction, pole: &RejectedMode) {
+        let line_hz = joint_fit::spacing_hz(&data.frequency_hz, pole.frequency_hz);
+        let half_hz = (pole.damping_ratio * pole.frequency_hz).max(1.5 * line_hz);
+        let from = found
+            .frequency_hz
+            .partition_point(|&f| f < pole.frequency_hz - half_hz);
+        let to = found
+            .frequency_hz
+            .partition_point(|&f| f <= pole.frequency_hz + half_hz);
+        for k in from..to {
+            let line = data.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
+            self.measured += found.measured_m_per_n[k].norm_sqr();
+            self.left += (found.measured_m_per_n[k] - found.fitted_m_per_n[k]).norm_sqr();
+            self.noise += data.sigma.get(line).map_or(0.0, |sigma| sigma * sigma);
+        }
+    }
+
+    /// What noise does not explain, and which is more than a test lacks anyway.
+    fn is_much(&self) -> bool {
+        self.left > LEFT_OVER_NOISE * self.noise && self.left - self.noise > LEFT_SHARE * self.measured
     }
 }
 
@@ -631,6 +726,37 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_where_a_pole_was_left_out_counts_beyond_the_noise_only() {
+        let lines: Vec<f64> = (0..100).map(|k| 10.0 + 0.1 * k as f64).collect();
+        let of = |left: f64, sigma: f64| {
+            let data = Data {
+                frequency_hz: lines.clone(),
+                receptance: vec![Complex64::ONE; 100],
+                sigma: vec![sigma; 100],
+                spread_hz: Vec::new(),
+                count: Vec::new(),
+            };
+            let found = Reconstruction {
+                error_nrms: left,
+                noise_nrms: sigma,
+                frequency_hz: lines.clone(),
+                measured_m_per_n: vec![Complex64::ONE; 100],
+                fitted_m_per_n: vec![Complex64::new(1.0 - left, 0.0); 100],
+            };
+            let pole = Pole {
+                frequency_hz: 15.0,
+                damping_ratio: 0.02,
+            };
+            let mut there = LeftThere::default();
+            there.add(&data, &found, &RejectedMode::new(&pole, ""));
+            there.is_much()
+        };
+        assert!(of(0.2, 0.01));
+        // Noise, and a little that every model lacks.
+        assert!(!of(0.2, 0.2) && !of(0.05, 0.001));
+    }
 
     #[test]
     fn a_pole_beyond_the_lines_or_damped_beyond_measure_is_no_mode() {

@@ -106,7 +106,15 @@ pub fn global(frfs: &[SetMember], settings: &Settings) -> Result<GlobalModes> {
         result.stabilisation = diagram;
         return Ok(result);
     };
-    findings::collect(&groups, &data, &full, &members, &of_member, &mut result);
+    findings::collect(
+        &groups,
+        &data,
+        &full,
+        &members,
+        &of_member,
+        &rejected,
+        &mut result,
+    );
     findings::explain(&mut diagram, &result.modes, &changes);
     findings::reject(rejected, &mut diagram, &mut result);
     result.stabilisation = diagram;
@@ -299,6 +307,7 @@ fn shape_data(data: &[Data]) -> Option<ShapeData<'_>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::modal::quality::QualityGrade;
     use crate::modal::synthetic::{Synthetic, SyntheticMode};
     use crate::modal::{FrfModes, analyse_frf};
     use rand::{Rng, SeedableRng};
@@ -428,6 +437,114 @@ mod tests {
         }
         let many = found.modes.iter().filter(|m| m.frequency_hz > 3.5).count();
         assert_eq!(many, modes.len(), "{:?}", found.modes);
+    }
+
+    /// 0.5 to 1.5, of either sign, by chance.
+    fn by_chance(random: &mut ChaCha8Rng) -> f64 {
+        let size = random.random_range(0.5..1.5);
+        if random.random() { size } else { -size }
+    }
+
+    #[test]
+    fn complex_modes_closer_than_their_width_are_both_given_where_either_half_of_the_frfs_has_them() {
+        // A general viscous mode has the residues A/(2iω_d) and their conjugates, of any phase; at t = 0 their real parts
+        // cancel, since a blow displaces nothing at once.
+        let modes = [
+            (12.0, 0.01),
+            (20.0, 0.012),
+            (30.0, 0.012),
+            (30.12, 0.013),
+            (45.0, 0.01),
+        ];
+        let mut random = ChaCha8Rng::seed_from_u64(16);
+        let frfs: Vec<_> = (0..24)
+            .map(|_| {
+                let (f, mut h) = Synthetic::new(5.0, 60.0, 0.05, &[]).frf();
+                let out_of_phase = 2.0 * by_chance(&mut random);
+                for (r, (f0, zeta)) in modes.into_iter().enumerate() {
+                    let imaginary = match r {
+                        2 => out_of_phase,
+                        3 => -out_of_phase,
+                        _ => 0.0,
+                    };
+                    let constant = Complex64::new(by_chance(&mut random), imaginary);
+                    let omega = std::f64::consts::TAU * f0;
+                    let damped = omega * (1.0f64 - zeta * zeta).sqrt();
+                    let pole = Complex64::new(-zeta * omega, damped);
+                    let residue = constant / Complex64::new(0.0, 2.0 * damped);
+                    for (f, h) in f.iter().zip(&mut h) {
+                        let s = Complex64::new(0.0, std::f64::consts::TAU * f);
+                        *h += residue / (s - pole) + residue.conj() / (s - pole.conj());
+                    }
+                }
+                for h in &mut h {
+                    *h *= 1.0
+                        + 0.003
+                            * Complex64::new(random.random_range(-1.0..1.0), random.random_range(-1.0..1.0));
+                }
+                (f, h)
+            })
+            .collect();
+        let found = global_with(&frfs, modes.len());
+        for (mode, (f, _)) in found.modes.iter().zip(modes) {
+            assert!((mode.frequency_hz - f).abs() < 0.02, "{mode:?} for {f} Hz");
+        }
+        assert!(
+            found.warnings.iter().any(|w| w.contains("either half")),
+            "{:?}",
+            found.warnings
+        );
+    }
+
+    #[test]
+    fn a_sensor_that_moves_the_frequencies_slightly_is_told_and_the_standard_deviations_cover_it() {
+        let modes = [
+            (12.0, 0.01),
+            (20.0, 0.012),
+            (30.0, 0.008),
+            (38.0, 0.01),
+            (45.0, 0.01),
+        ];
+        let set = |mass: f64| -> Vec<_> {
+            let mut random = ChaCha8Rng::seed_from_u64(161);
+            (0..24)
+                .map(|k| {
+                    let shape: Vec<f64> = modes.iter().map(|_| by_chance(&mut random)).collect();
+                    let loaded = modes.iter().zip(&shape).map(|(&(f, zeta), &phi)| {
+                        SyntheticMode::new(f * (1.0 - mass * phi * phi / 2.25), zeta, phi)
+                    });
+                    Synthetic::new(5.0, 60.0, 0.05, &loaded.collect::<Vec<_>>())
+                        .with_noise(0.002, 0.005, 500 + k)
+                        .frf()
+                })
+                .collect()
+        };
+        let told = |found: &GlobalModes| {
+            found
+                .quality
+                .reasons
+                .iter()
+                .any(|r| r.contains("move from FRF to FRF"))
+        };
+        let still = global_with(&set(0.0), modes.len());
+        assert!(
+            !told(&still) && still.quality.verdict == QualityGrade::Good,
+            "{:?}",
+            still.quality
+        );
+        let moved = global_with(&set(0.001), modes.len());
+        assert!(
+            told(&moved) && moved.quality.verdict == QualityGrade::Doubtful,
+            "{:?}",
+            moved.quality
+        );
+        for (mode, (f, _)) in moved.modes.iter().zip(modes) {
+            let off = (mode.frequency_hz - f).abs();
+            assert!(
+                off < 2.5 * mode.frequency_std_hz && mode.frequency_std_hz < 1e-3 * f,
+                "{mode:?} for {f} Hz"
+            );
+        }
     }
 
     #[test]

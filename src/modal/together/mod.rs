@@ -7,6 +7,7 @@ pub(crate) mod global;
 #[cfg(test)]
 pub(crate) mod global_marks;
 pub(crate) mod global_modes;
+mod halves;
 pub(crate) mod lscf;
 pub(crate) mod own_places;
 pub(crate) mod reconstruction;

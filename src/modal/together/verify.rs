@@ -11,6 +11,7 @@ use crate::modal::settings::SET;
 use crate::modal::shape;
 use crate::modal::single::local_fit::Pole;
 use crate::modal::together::global_modes::RejectedMode;
+use crate::modal::together::halves::Halves;
 use crate::modal::together::set_noise;
 
 /// Fits after poles were taken out, at most.
@@ -65,6 +66,14 @@ const CLEARLY: f64 = 20.0;
 const HARD_TO_TELL: f64 = 0.5;
 /// Two poles that leave hardly less than one that moves are one: they have four parameters more. Two modes leave many times less.
 const ONE_MODE: f64 = 1.02;
+/// Two that cancel each other are two modes from where one that moves leaves so many times more …
+const TWO_MODES: f64 = 1.5;
+/// … or where none moves, if both have so many lines in the half-power band,
+const RESOLVED_LINES: f64 = 3.0;
+/// … so many times the power of the coloured rest there,
+const FAR_OVER_REST: f64 = 20.0;
+/// … and this part of what their phases add to the displacement right after a blow taken back by other modes.
+const BALANCED: f64 = 0.5;
 /// A pole so many times as wide as its neighbour is the ground on which that stands …
 const GROUND: f64 = 5.0;
 /// … where it is more than so many of the neighbour's half-widths away.
@@ -97,15 +106,17 @@ pub(crate) fn verified(
             common_phase: common_phase(&data, &groups),
             one_place: one_place(&data, &groups),
         };
+        let at_once = displaced_at_once(&groups);
         for group in &groups {
-            let pairs = close_pairs(&data, group, sight);
+            let witness = Witness::new(&data, group, &at_once);
+            let pairs = close_pairs(&witness, sight);
             let poles = &group.solution.poles;
             let mut doubtful: Vec<(usize, f64, String)> = Vec::new();
             let mut leaves: Vec<Option<String>> = vec![None; poles.len()];
             for j in 0..poles.len() {
                 match pairs.iter().find(|p| p.weak == j) {
                     Some(pair) => leaves[j] = Some(pair.reason.clone()),
-                    None => doubtful.extend(reason(&data, group, j).map(|(s, why)| (j, s, why))),
+                    None => doubtful.extend(reason(&witness, j).map(|(s, why)| (j, s, why))),
                 }
             }
             // Of neighbours the one that makes least of what was measured goes first: poles that share a mode among them look
@@ -246,9 +257,11 @@ pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, us
         return Vec::new();
     }
     let mut found = Vec::new();
+    let at_once = displaced_at_once(groups);
     for (g, group) in groups.iter().enumerate() {
         let poles = &group.solution.poles;
         let all: Vec<Candidate> = (0..poles.len()).map(|j| Candidate::new(data, group, j)).collect();
+        let witness = Witness::new(data, group, &at_once);
         for (j, candidate) in all.iter().enumerate().filter(|(_, c)| c.mpc() < BY_CHANCE) {
             let mut beside = (0..poles.len())
                 .filter(|&k| k != j && neighbours(data, poles[j], poles[k]))
@@ -263,7 +276,7 @@ pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, us
                 }),
                 None => cancelled,
             };
-            if is_part {
+            if is_part && !witness.bears_out(candidate) {
                 found.push((g, j));
             }
         }
@@ -272,14 +285,110 @@ pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, us
 }
 
 /// Why pole `j` of a group is no mode, and the share that it makes of what was measured around it.
-fn reason(data: &[Data], group: &Group, j: usize) -> Option<(f64, String)> {
-    let candidate = Candidate::new(data, group, j);
+fn reason(witness: &Witness, j: usize) -> Option<(f64, String)> {
+    let candidate = Candidate::new(witness.data, witness.group, j);
     let share = candidate.local.mode / candidate.local.measured;
-    Some((share, against(&candidate)?))
+    Some((share, against(&candidate, || witness.bears_out(&candidate))?))
 }
 
-/// What speaks against a pole.
-fn against(candidate: &Candidate) -> Option<String> {
+/// By FRF, how far all poles together displace its point right after a blow: of modes with numerators aᵣ + bᵣs it is Σ bᵣ. In a
+/// structure it is nought, up to what lies outside the band: a force displaces no mass at once.
+fn displaced_at_once(groups: &[Group]) -> Vec<f64> {
+    let Some(first) = groups.first() else {
+        return Vec::new();
+    };
+    let of_frf = |m| {
+        let solutions = groups.iter().map(|g| &g.solution);
+        solutions
+            .flat_map(|s| (0..s.poles.len()).map(move |j| s.displaces_at_once(m, j)))
+            .sum()
+    };
+    (0..first.solution.frfs.len()).map(of_frf).collect()
+}
+
+/// What can bear a group's poles out where their phases do not: a dashpot at one point makes the phases of close modes as different
+/// from FRF to FRF as an error does (Caughey & O'Kelly 1965), and so does a rotor.
+struct Witness<'a> {
+    data: &'a [Data],
+    group: &'a Group,
+    halves: Halves,
+    at_once: &'a [f64],
+}
+
+impl<'a> Witness<'a> {
+    /// `at_once`: of all groups, see [`displaced_at_once`].
+    fn new(data: &'a [Data], group: &'a Group, at_once: &'a [f64]) -> Witness<'a> {
+        Witness {
+            data,
+            group,
+            halves: Halves::default(),
+            at_once,
+        }
+    }
+
+    /// Whether a pole is a mode whatever its phases are. What repairs the model of other modes or follows an error of the measurement
+    /// is narrower than the lines show, leaves a rest of its own size, displaces a mass at once, or is elsewhere, or another shape, in
+    /// other FRFs.
+    fn bears_out(&self, candidate: &Candidate) -> bool {
+        let Candidate {
+            solution,
+            pole: j,
+            local,
+            ..
+        } = candidate;
+        let pole = solution.poles[*j];
+        let line_hz = joint_fit::line_hz(self.data, pole.frequency_hz);
+        let lines = 2.0 * pole.damping_ratio * pole.frequency_hz / line_hz;
+        let (seen_in, _) = joint_fit::seen_in(solution, *j);
+        !local.one_sided
+            && lines >= RESOLVED_LINES
+            && A_GOOD_PART * seen_in >= solution.taking_part()
+            && local.mode > FAR_OVER_REST * local.coloured
+            && self.taken_back(*j) > BALANCED
+            && self.halves.agree(self.data, self.group, *j)
+    }
+
+    /// The part of what pole `j` displaces at once that others take back, over the FRFs: one for a structure's mode whose partners are
+    /// in the band, about nought for a pole with phases of its own. Its neighbours alone tell better where there is much besides.
+    fn taken_back(&self, j: usize) -> f64 {
+        let solution = &self.group.solution;
+        let near = |m: usize| -> f64 {
+            let poles = solution.poles.len() + solution.fixed().len();
+            (0..poles).map(|k| solution.displaces_at_once(m, k)).sum()
+        };
+        let (mut square, mut by_near, mut by_all) = (0.0, 0.0, 0.0);
+        for (m, all) in self.at_once.iter().enumerate() {
+            let own = solution.displaces_at_once(m, j);
+            square += own * own;
+            by_near += own * (own - near(m));
+            by_all += own * (own - all);
+        }
+        if square > 0.0 {
+            by_near.max(by_all) / square
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The poles, by group and number, whose shape is complex and which are modes all the same.
+pub(super) fn complex_modes(data: &[Data], groups: &[Group]) -> Vec<(usize, usize)> {
+    let mut found = Vec::new();
+    let at_once = displaced_at_once(groups);
+    for (g, group) in groups.iter().enumerate() {
+        let witness = Witness::new(data, group, &at_once);
+        for j in 0..group.solution.poles.len() {
+            let candidate = Candidate::new(data, group, j);
+            if candidate.mpc() < shape::COLLINEAR && witness.bears_out(&candidate) {
+                found.push((g, j));
+            }
+        }
+    }
+    found
+}
+
+/// What speaks against a pole. `borne_out`: whether phases of its own do not.
+fn against(candidate: &Candidate, borne_out: impl Fn() -> bool) -> Option<String> {
     let Candidate {
         solution,
         pole: j,
@@ -313,14 +422,14 @@ fn against(candidate: &Candidate) -> Option<String> {
         ));
     }
     if frfs >= ENOUGH_FRFS && !candidate.dominates() {
-        if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE {
+        if local.mode < SMALL_SHARE * local.measured && mpc < CLEARLY_IN_PHASE && !borne_out() {
             return Some(format!(
                 "it makes {:.0} % of what was measured around it and its FRFs have no clear common phase (collinearity {mpc:.2}): \
                  what the model of stronger neighbours lacks",
                 100.0 * local.mode / local.measured
             ));
         }
-        if mpc < COLLINEAR {
+        if mpc < COLLINEAR && !borne_out() {
             return Some(format!(
                 "its FRFs have no common phase (collinearity {mpc:.2}): error of the measurement or of its neighbours' model"
             ));
@@ -399,8 +508,8 @@ struct ClosePair {
 
 /// The pairs of a group that are one mode: because its frequency moves from FRF to FRF, or because the shapes repeat. No
 /// pole is in two of them.
-fn close_pairs(data: &[Data], group: &Group, sight: Sight) -> Vec<ClosePair> {
-    let solution = &group.solution;
+fn close_pairs(witness: &Witness, sight: Sight) -> Vec<ClosePair> {
+    let solution = &witness.group.solution;
     let mut order: Vec<usize> = (0..solution.poles.len()).collect();
     order.sort_by(|&a, &b| {
         solution.poles[a]
@@ -410,7 +519,7 @@ fn close_pairs(data: &[Data], group: &Group, sight: Sight) -> Vec<ClosePair> {
     let mut found = Vec::new();
     let mut k = 1;
     while k < order.len() {
-        match close_pair(data, solution, [order[k - 1], order[k]], sight) {
+        match close_pair(witness, [order[k - 1], order[k]], sight) {
             Some(pair) => {
                 found.push(pair);
                 k += 2;
@@ -421,7 +530,9 @@ fn close_pairs(data: &[Data], group: &Group, sight: Sight) -> Vec<ClosePair> {
     found
 }
 
-fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], sight: Sight) -> Option<ClosePair> {
+fn close_pair(witness: &Witness, both: [usize; 2], sight: Sight) -> Option<ClosePair> {
+    let (data, group) = (witness.data, witness.group);
+    let solution = &group.solution;
     let [a, b] = both.map(|j| solution.poles[j]);
     let width = a.damping_ratio * a.frequency_hz + b.damping_ratio * b.frequency_hz;
     let line_hz = joint_fit::line_hz(data, a.frequency_hz);
@@ -450,8 +561,11 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], sight: Sight
     let hard_to_tell = !enough && apart_hz < (HARD_TO_TELL * width).max(line_hz);
     let most = if hard_to_tell { CLEARLY } else { ONE_MODE };
     // A narrow mode does not move as far as a broad one beside it reaches.
-    let halves = [a, b].map(|p| p.damping_ratio * p.frequency_hz);
-    let (narrow_hz, broad_hz) = (halves[0].min(halves[1]), halves[0].max(halves[1]));
+    let half_widths_hz = [a, b].map(|p| p.damping_ratio * p.frequency_hz);
+    let (narrow_hz, broad_hz) = (
+        half_widths_hz[0].min(half_widths_hz[1]),
+        half_widths_hz[0].max(half_widths_hz[1]),
+    );
     let is_ground = broad_hz > GROUND * narrow_hz && apart_hz > FAR_WIDTHS * narrow_hz.max(0.5 * line_hz);
     let moving = match is_ground {
         true => None,
@@ -474,7 +588,13 @@ fn close_pair(data: &[Data], solution: &Solution, both: [usize; 2], sight: Sight
     let cancel = enough
         && (same_place && residues.iter().any(out_of_phase)
             || sight.common_phase && residues.iter().all(out_of_phase));
-    if cancel {
+    let two = || {
+        moving.as_ref().is_none_or(|m| m.leaves > TWO_MODES)
+            && both
+                .iter()
+                .all(|&j| witness.bears_out(&Candidate::new(data, group, j)))
+    };
+    if cancel && !two() {
         return Some(ClosePair {
             strong,
             weak,
@@ -648,6 +768,63 @@ pub(crate) fn otherwise(solution: &Solution, j: usize) -> Option<[Otherwise; 2]>
             Otherwise { change, std }
         })
     })
+}
+
+/// How much more the FRFs scatter about the frequency of a mode than about its damping.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Movement {
+    /// ln of the ratio of the mean squares, each over its uncertainty: of nought on the average where nothing moves.
+    pub log_ratio: f64,
+    /// Its standard deviation then.
+    pub std: f64,
+    /// Relative standard deviation of the frequency over the FRFs, each counting by what it knows.
+    pub scatter: f64,
+}
+
+/// Any error of the measurement, white or coloured, pulls the frequency of an FRF's own pole as much as its damping, each over its
+/// uncertainty: in the resonance circle they are the two directions of one complex number. A mass that moves, or the temperature,
+/// moves the frequencies alone. The ratio of two mean squares of n values each has the F distribution: its logarithm scatters by
+/// √(4/n) (Fisher 1924). A tenth of the FRFs, the largest, does not count. `None` where too few tell.
+pub(crate) fn movement(solution: &Solution, j: usize) -> Option<Movement> {
+    const LEAST_FRFS: usize = 8;
+    const KNOWN: f64 = 0.3;
+    const LEFT_OUT: usize = 10;
+    let width = solution.poles[j].damping_ratio;
+    let steps: Vec<([f64; 2], [f64; 2])> = own_steps(solution, j)
+        .filter(|(_, std)| std[0] < KNOWN * width && std[1] < KNOWN)
+        .collect();
+    if steps.len() < LEAST_FRFS {
+        return None;
+    }
+    let count = steps.len() - steps.len() / LEFT_OUT;
+    let [frequency, damping] = [0, 1].map(|k| {
+        let mut squares: Vec<f64> = steps
+            .iter()
+            .map(|(step, std)| (step[k] / std[k]).powi(2))
+            .collect();
+        squares.sort_by(f64::total_cmp);
+        squares[..count].iter().sum::<f64>()
+    });
+    let precision: f64 = steps.iter().map(|(_, std)| std[0].powi(-2)).sum();
+    let found = Movement {
+        log_ratio: (frequency / damping).ln(),
+        std: (4.0 / count as f64).sqrt(),
+        scatter: ((frequency - damping).max(0.0) / precision).sqrt(),
+    };
+    (found.log_ratio.is_finite() && found.scatter.is_finite()).then_some(found)
+}
+
+/// How far all modes of a set move, slightly as it may be: by the median over them, and only where several do, most of those that
+/// tell, and all together far beyond chance.
+pub(crate) fn set_moves(modes: &[Movement]) -> Option<f64> {
+    const LEAST_MODES: usize = 3;
+    const FAR_BEYOND_CHANCE: f64 = 5.0;
+    const EACH: f64 = 2.0;
+    let moving = modes.iter().filter(|m| m.log_ratio > EACH * m.std).count();
+    let sum: f64 = modes.iter().map(|m| m.log_ratio).sum();
+    let std = modes.iter().map(|m| m.std.powi(2)).sum::<f64>().sqrt();
+    let moves = moving >= LEAST_MODES && 2 * moving > modes.len() && sum > FAR_BEYOND_CHANCE * std;
+    moves.then(|| crate::signal::median(&modes.iter().map(|m| m.scatter).collect::<Vec<_>>()))
 }
 
 /// How far a mode moves from FRF to FRF.

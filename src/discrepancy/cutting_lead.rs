@@ -32,6 +32,8 @@ pub enum LineKind {
     Chatter,
     /// Against the lines of the teeth: their modulation.
     BesideTeeth,
+    /// A multiple of the tooth passing above half the sampling rate, folded down by it.
+    Folded,
     /// 50 or 60 Hz and their harmonics.
     Mains,
     /// In the air as well.
@@ -51,6 +53,7 @@ impl LineKind {
             LineKind::NaturalFrequency => "natural frequency (the same at every speed)",
             LineKind::Chatter => "not a whole number of turns, another at each speed (chatter)",
             LineKind::BesideTeeth => "close to tooth passing",
+            LineKind::Folded => "harmonics of tooth passing, folded by the sampling rate",
             LineKind::Mains => "mains",
             LineKind::NotCutting => "in the air, too",
         }
@@ -105,6 +108,10 @@ impl LineKind {
             }
             LineKind::BesideTeeth => {
                 "a spindle speed that wavers, a load that comes and goes (feed not steady, chips), beating with another source"
+            }
+            LineKind::Folded => {
+                "a sampling rate too low for the teeth, without an anti-aliasing filter: sample at 20 a tooth or more, or filter \
+                 before sampling"
             }
             LineKind::Mains => "electrical pickup: earth loop, cable next to a motor's, amplifier supply",
             LineKind::NotCutting => {
@@ -179,6 +186,8 @@ const OTHER_SPEED: f64 = 0.02;
 const BESIDE: f64 = 0.12;
 /// Share of the spindle frequency below which a line is slow.
 const SLOW: f64 = 0.5;
+/// Multiples of the tooth passing that fold with a size that matters.
+const FOLDED_AT_MOST: usize = 12;
 /// Half width of a resonance among the orders, as a share of its frequency.
 const RESONANCE: f64 = 0.2;
 
@@ -336,6 +345,8 @@ fn beside_orders(data: &CuttingData, index: usize, teeth: usize) -> Vec<Line> {
             LineKind::SlowerThanTurn
         } else if cut.orders == 0 && near(spindle_hz, 1.5 * line.resolution_hz) {
             order_kind((hz / spindle_hz).round() as usize, teeth)
+        } else if is_folded(hz, tooth_hz, cut.sample_rate_hz, 1.5 * line.resolution_hz) {
+            LineKind::Folded
         } else if near(tooth_hz, (BESIDE * tooth_hz).max(3.0 * line.resolution_hz)) {
             LineKind::BesideTeeth
         } else if data.cuts.iter().any(|other| same(other)) {
@@ -355,6 +366,14 @@ fn beside_orders(data: &CuttingData, index: usize, teeth: usize) -> Vec<Line> {
         }
     }
     lines
+}
+
+/// Whether `hz` is where sampling at `rate_hz` shows a multiple of `tooth_hz` from above half of it, within `width_hz`.
+fn is_folded(hz: f64, tooth_hz: f64, rate_hz: f64, width_hz: f64) -> bool {
+    (1..=FOLDED_AT_MOST).map(|k| k as f64 * tooth_hz).any(|true_hz| {
+        let seen_hz = (true_hz - rate_hz * (true_hz / rate_hz).round()).abs();
+        true_hz > 0.5 * rate_hz && (seen_hz - hz).abs() < width_hz
+    })
 }
 
 /// Orders that stand out about one frequency whatever the speed show a resonance.
@@ -445,6 +464,14 @@ mod tests {
         let theta = calibrate_cutting(model, data).unwrap().theta;
         let fits = CuttingProblem { model, data }.fits(&theta).unwrap();
         cutting_lead(data, &fits)
+    }
+
+    #[test]
+    fn multiples_of_tooth_passing_come_back_folded() {
+        // Sampled at 700 Hz, twice 200.5 Hz shows at 299 Hz, and four times at 102 Hz.
+        let folded = |hz| is_folded(hz, 200.5, 700.0, 0.5);
+        assert!(folded(299.0) && folded(102.0) && !folded(200.5) && !folded(250.0));
+        assert!(!is_folded(299.0, 200.5, 10_000.0, 0.5));
     }
 
     #[test]

@@ -251,6 +251,8 @@ pub(super) struct SetFindings {
     pub moving: bool,
     /// Poles that were left out where the modes leave much unexplained, Hz.
     pub left_out_hz: Vec<f64>,
+    /// Modes that are far broader than the others, where too few FRFs tell a mode from what the others' model lacks, Hz.
+    pub broad_hz: Vec<f64>,
     /// Modes that there may be besides.
     pub doubts: usize,
     /// Modes that the FRFs by themselves put elsewhere than the common fit, Hz.
@@ -324,6 +326,17 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             format!(
                 "what was left out at {} Hz may be a mode: the others do not explain what was measured there (why it was left out: \
                  --json)",
+                places.join(", ")
+            ),
+        );
+    }
+    if !found.broad_hz.is_empty() {
+        let places: Vec<String> = found.broad_hz.iter().map(|f| format!("{f:.2}")).collect();
+        note(
+            QualityGrade::Doubtful,
+            format!(
+                "far broader than the other modes, in too few FRFs to tell a mode from an error of the measurement: {} Hz (more response \
+                 points would tell)",
                 places.join(", ")
             ),
         );

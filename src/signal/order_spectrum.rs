@@ -38,9 +38,12 @@ const MANY_REVOLUTIONS: f64 = 8.0;
 /// An order whose neighbourhood holds this many times the power of the orders around it keeps its own.
 const STANDS_OUT: f64 = 2.0;
 
+/// Share of the sampling rate up to which what is sampled is seen whole: an anti-aliasing filter rolls off from there.
+pub const SEEN_WHOLE: f64 = 0.4;
+
 /// Highest order worth keeping: `wanted`, or what the sampling shows.
 pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
-    wanted.min((0.45 * samples_per_revolution).floor().max(0.0) as usize)
+    wanted.min((SEEN_WHOLE * samples_per_revolution).floor().max(0.0) as usize)
 }
 
 /// Samples that are transformed at once, at most: a longer window's lines are the mean power of its pieces, so that memory does not

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::cut_analysis::{ChannelAnalysis, Notice};
+use crate::cutting::measured::leak::leaked;
 use crate::data::{Process, Sample};
 use crate::signal::{self, Air, DriftLine, fit_drift};
 use crate::text::figures;
@@ -129,10 +130,14 @@ pub(crate) fn believable_air<S: Sample>(
     (sound, short)
 }
 
+/// A channel that carries this share of the largest force says how much of it was lost.
+const CARRIES: f64 = 0.2;
+
 pub(crate) fn air_notices(
     air: &Air,
     channels: &[&ChannelAnalysis],
     record_s: f64,
+    cutting_s: f64,
     notices: &mut Vec<Notice>,
 ) {
     let kind = match (&air.before, &air.after) {
@@ -149,7 +154,7 @@ pub(crate) fn air_notices(
         .iter()
         .filter(|c| c.drift.step != 0.0)
         .map(|c| format!("{} by {:+.1} {}", c.axis.label(), c.drift.step, c.axis.unit()));
-    let moved: Vec<String> = moved.collect();
+    let mut moved: Vec<String> = moved.collect();
     let is_bent = |c: &&&ChannelAnalysis| c.drift.bend > 0.02 * c.mean.average.value.abs();
     let bent = channels.iter().filter(is_bent).map(|c| {
         let (label, unit) = (c.axis.label(), c.axis.unit());
@@ -161,6 +166,16 @@ pub(crate) fn air_notices(
         let forces = channels.iter().filter(same).map(|o| o.mean.average.value.abs());
         forces.fold(0.0, f64::max)
     };
+    let each: Vec<[f64; 2]> = channels
+        .iter()
+        .map(|c| (c.mean.average.value, c.drift.step, size(c)))
+        .filter(|(force, _, size)| force.abs() > CARRIES * size)
+        .map(|(force, step, _)| [force, step])
+        .collect();
+    if let Some(leak) = leaked(&each, cutting_s) {
+        moved.clear();
+        notices.push(leak);
+    }
     let change = |c: &ChannelAnalysis| c.drift.slope_per_s * record_s;
     let is_steep = |c: &&&ChannelAnalysis| {
         !is_bent(c)
@@ -304,7 +319,7 @@ mod tests {
             before: Some(0..10),
             after: Some(20..30),
         };
-        air_notices(&air, &channels.iter().collect::<Vec<_>>(), 4.0, &mut notices);
+        air_notices(&air, &channels.iter().collect::<Vec<_>>(), 4.0, 2.0, &mut notices);
         notices.iter().map(|n| n.kind).collect()
     }
 
@@ -348,7 +363,7 @@ mod tests {
                 before: before.then_some(0..10),
                 after: after.then_some(20..30),
             };
-            air_notices(&air, &[], 4.0, &mut notices);
+            air_notices(&air, &[], 4.0, 2.0, &mut notices);
         }
         let kinds: Vec<&str> = notices.iter().map(|n| n.kind).collect();
         assert_eq!(kinds, [NO_AIR, NO_AIR_BEFORE, NO_AIR_AFTER]);

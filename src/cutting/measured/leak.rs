@@ -54,6 +54,44 @@ pub(crate) fn high_pass<S: Sample>(
     })
 }
 
+/// The shares that channels lost differ by this factor at most …
+const SAME_SHARE: f64 = 1.4;
+/// … and lie between these: of a force that leaks away within the cut the zero takes more than its mean.
+const SHARES: std::ops::Range<f64> = 0.02..3.0;
+/// Up to this share the force hardly changes in the cut, so that the share tells the time constant.
+const SLOW: f64 = 0.7;
+
+/// Of a time constant longer than the air after the cut, where the zero does not come back in the record: each channel's zero moved
+/// against its force, by the same share of it. `channels`: mean force and step of the zero of those that carry it, N or N·m;
+/// `cutting_s`: how long it acted.
+pub(crate) fn leaked(channels: &[[f64; 2]], cutting_s: f64) -> Option<Notice> {
+    let mut shares: Vec<f64> = channels.iter().map(|[force, step]| -step / force).collect();
+    shares.sort_by(f64::total_cmp);
+    let [least, .., most] = shares.as_slice() else {
+        return None;
+    };
+    let alike = SHARES.contains(least) && SHARES.contains(most) && *most < SAME_SHARE * least;
+    let share = 0.5 * (least + most);
+    // What is left of a unit force after the time that it acted is e^(−t/τ).
+    let time_constant = match share < SLOW {
+        true => format!(
+            "of about {} s",
+            crate::text::figures(-cutting_s / (-share).ln_1p(), 2)
+        ),
+        false => format!(
+            "no longer than the cut's {} s",
+            crate::text::figures(cutting_s, 2)
+        ),
+    };
+    alike.then(|| Notice {
+        kind: HIGH_PASS,
+        detail: format!(
+            "the zero of each channel moved against its force by the same share, {:.0} %: a time constant {time_constant}",
+            100.0 * share
+        ),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -91,5 +129,19 @@ mod tests {
         assert_eq!(told(200.0, 1e9, 30.0), None);
         // A long time constant takes little, and what it took does not come back within a second.
         assert_eq!(told(200.0, 40.0, 0.0), None);
+    }
+
+    #[test]
+    fn zeros_that_move_against_their_forces_by_one_share_are_a_leak() {
+        let told = |channels: &[[f64; 2]]| leaked(channels, 2.0).map(|n| n.detail);
+        let found = told(&[[-100.0, 18.0], [400.0, -72.5]]).unwrap();
+        assert!(found.contains("18 %") && found.contains("about 10 s"), "{found}");
+        let fast = told(&[[-100.0, 130.0], [400.0, -510.0]]).unwrap();
+        assert!(fast.contains("no longer than the cut's 2 s"), "{fast}");
+        // One alone, along the force, of other shares, or none.
+        assert_eq!(told(&[[400.0, -72.0]]), None);
+        assert_eq!(told(&[[-100.0, -18.0], [400.0, 72.5]]), None);
+        assert_eq!(told(&[[-100.0, 18.0], [400.0, -20.0]]), None);
+        assert_eq!(told(&[[-100.0, 0.0], [400.0, 0.0]]), None);
     }
 }

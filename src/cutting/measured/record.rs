@@ -62,6 +62,18 @@ const TEETH_DIFFER: &str = "the teeth cut unevenly: the tool runs out, or one of
 const OTHER_TEETH: &str = "the teeth do not cut as pitch_deg and tooth_radius_offset_mm of [tool] have it, so that coefficients come out \
      wrong, those of the edge most: look at the teeth; the lists go in the order in which they cut, a radius of 0 is that of a tooth that \
      stands like the first";
+const FEW_SAMPLES: &str = "few samples for each tooth: averages and coefficients hold, but what a tooth does in its pass is not in the \
+     record, and without an anti-aliasing filter what lies above half the sampling rate comes back as other lines; 20 and more show it";
+const ROTATING: &str = "Fx and Fy turn with the tool, as those of a dynamometer in the spindle do: their averages over a turn are nearly \
+     nothing and give no coefficients; turn them back into the direction of the feed by the spindle's angle before, or use Fz and Mz alone";
+/// Samples for each tooth below which it is told.
+const SAMPLES_PER_TOOTH: f64 = 10.0;
+/// A force that turns with the tool: its parts differ by this share, and are this near to a quarter of a turn apart (cosine of the
+/// angle), its mean is this share of it, and the air has this share.
+const TURNING_ALIKE: f64 = 0.1;
+const TURNING_QUARTER: f64 = 0.15;
+const TURNING_MEAN: f64 = 0.1;
+const TURNING_IN_AIR: f64 = 0.3;
 const IMPOSSIBLE: &str = "no machine tool bears such a load: the unit or the gain of the channel is wrong, or its values are no forces \
      (unit and gain in a [[channel]] of campaign.toml)";
 /// N (torques: N·m).
@@ -217,7 +229,8 @@ pub fn analyse_cut<S: Sample>(
         }
     }
     let own: Vec<&ChannelAnalysis> = channels.iter().filter(|c| carrying.contains(&c.axis)).collect();
-    air_notices(&phases.air, &own, samples as f64 / rate, &mut notices);
+    let cutting_s = phases.cutting.len() as f64 / rate;
+    air_notices(&phases.air, &own, samples as f64 / rate, cutting_s, &mut notices);
     if let (Some(before), Some(after)) = (&phases.air.before, &phases.air.after) {
         let told = carriers.iter().filter_map(|(axis, values)| {
             high_pass(
@@ -231,7 +244,7 @@ pub fn analyse_cut<S: Sample>(
     }
     let pass = phases.passes.iter().find(|p| p.contains(&steady.start));
     let of_cut = steady.len() as f64 / pass.unwrap_or(&phases.cutting).len().max(1) as f64;
-    unsteady_notice(
+    let change = unsteady_notice(
         &usable,
         &channels,
         &steady,
@@ -244,6 +257,10 @@ pub fn analyse_cut<S: Sample>(
         record,
         &mut notices,
     );
+    for channel in &mut channels {
+        let average = &mut channel.mean.average;
+        average.std_error = average.std_error.hypot(STILL_TO_COME * change * average.value);
+    }
     if revolutions < 4.999 {
         notices.push(Notice {
             kind: SHORT_WINDOW,
@@ -269,6 +286,13 @@ pub fn analyse_cut<S: Sample>(
         // One edge that never leaves the work: no line to judge the speed by.
         CutGeometry::Turning { .. } => None,
     };
+    let per_tooth = samples_per_revolution / tool.teeth.max(1) as f64;
+    if cut.geometry.process() == Process::Milling && per_tooth < SAMPLES_PER_TOOTH {
+        notices.push(Notice {
+            kind: FEW_SAMPLES,
+            detail: figures(per_tooth, 2),
+        });
+    }
     let mut of_turn = None;
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
         notices.push(Notice {
@@ -497,7 +521,11 @@ const UNSTEADY: f64 = 0.05;
 /// The same where the window is less than half of the cut: what came before is a slow entry, which such a change shows not to be over.
 const STILL_ENTERING: f64 = 0.015;
 
-/// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does.
+/// Of a change that is told, this part of the force is uncertain: it may go on, or have been another before.
+const STILL_TO_COME: f64 = 0.5;
+
+/// Does the force (root mean square about zero, turn by turn) change over the window? Without air its fluctuation does. The change as a
+/// part of the force where it is told, else zero.
 fn unsteady_notice<S: Sample>(
     usable: &[UsableChannel<S>],
     channels: &[ChannelAnalysis],
@@ -506,7 +534,7 @@ fn unsteady_notice<S: Sample>(
     samples_per_revolution: f64,
     record: &TimeRecord<S>,
     notices: &mut Vec<Notice>,
-) {
+) -> f64 {
     let mut squares: Vec<f64> = Vec::new();
     for ((axis, _, values), channel) in usable.iter().zip(channels) {
         if *axis == ForceAxis::Mz {
@@ -528,12 +556,14 @@ fn unsteady_notice<S: Sample>(
     }
     let loudness: Vec<f64> = squares.into_iter().map(f64::sqrt).collect();
     let change = signal::change(&loudness);
-    if change.abs() > worth_telling {
-        notices.push(Notice {
-            kind: UNSTEADY_CUT,
-            detail: format!("by {:+.0} %", 100.0 * change),
-        });
+    if change.abs() <= worth_telling {
+        return 0.0;
     }
+    notices.push(Notice {
+        kind: UNSTEADY_CUT,
+        detail: format!("by {:+.0} %", 100.0 * change),
+    });
+    change
 }
 
 /// Orders of a longer window are taken from its start.
@@ -566,6 +596,22 @@ struct TurnOrders {
 }
 
 impl TurnOrders {
+    /// Whether the forces are those of axes that turn with the tool: a force that stands still there goes round once per turn, and
+    /// leaves no mean. Runout leaves the mean of the teeth, an unbalanced spindle shows in the air.
+    fn turns_with_the_tool(&self) -> bool {
+        let [x, y] = [0, 1].map(|axis| self.orders[axis].first().copied().unwrap_or_default());
+        let size = 0.5 * (x.norm() + y.norm());
+        let noise = [0, 1].map(|axis| self.std[axis].first().copied().unwrap_or(f64::INFINITY));
+        let in_air = self.air_power.first().copied().unwrap_or(0.0).sqrt();
+        // Of a coefficient the line has twice the size.
+        size > CERTAIN * noise[0].hypot(noise[1])
+            && (x.norm() - y.norm()).abs() < TURNING_ALIKE * size
+            && (x * y.conj()).re.abs() < TURNING_QUARTER * size * size
+            && self.zero_is_known
+            && self.mean[0].hypot(self.mean[1]) < TURNING_MEAN * 2.0 * size
+            && in_air < TURNING_IN_AIR * size
+    }
+
     /// Where the teeth are not listed one by one.
     fn uneven_teeth(&self) -> Option<UnevenTeeth> {
         if !self.milling.places.is_empty() || is_noise(&self.over_noise) {
@@ -658,6 +704,13 @@ fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
     if is_noise(&of_turn.over_noise) {
         notices.push(Notice {
             kind: NOTHING_REPEATS,
+            detail: String::new(),
+        });
+        return;
+    }
+    if of_turn.turns_with_the_tool() {
+        notices.push(Notice {
+            kind: ROTATING,
             detail: String::new(),
         });
         return;
@@ -973,11 +1026,16 @@ mod tests {
                 }
             });
             let analysis = read(&endmill(0.4, 95.0), &bar, &AS_IT_IS, &record);
-            analysis
-                .notices
-                .iter()
-                .find(|n| n.kind == UNSTEADY_CUT)
-                .map(|n| n.detail.clone())
+            let told = analysis.notices.iter().find(|n| n.kind == UNSTEADY_CUT);
+            // What is told is uncertain by half of it.
+            let crate::cutting::measured::cut_analysis::Average { value, std_error } =
+                analysis.averages[2].unwrap();
+            let part = if told.is_some() { growth / 3.0 } else { 0.0 };
+            assert!(
+                (std_error / value - part).abs() < 1e-3 + 0.1 * part,
+                "{std_error} of {value}"
+            );
+            told.map(|n| n.detail.clone())
         };
         // The last third against the first: two thirds of the growth.
         assert_eq!(told(0.3).as_deref(), Some("by +17 %"));
@@ -1042,6 +1100,59 @@ mod tests {
                 assert_relative_eq!(mean(0), -25.0, max_relative = 0.01);
             }
         }
+    }
+
+    /// Forces as a dynamometer in the spindle records them; runout, which leaves the mean, and a plain slot are none.
+    #[test]
+    fn forces_that_turn_with_the_tool_are_told() {
+        let slot = cut(CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        });
+        let mut tool = endmill(0.0, 90.0);
+        tool.helix_deg = 0.0;
+        for (share, turns) in [([1.0, 1.0], true), ([1.0, 1.0], false), ([0.7, 1.3], false)] {
+            let made = milled(share);
+            let analysis = read(
+                &tool,
+                &slot,
+                &AS_IT_IS,
+                &record(5.0, 4, |t| {
+                    let [x, y, z, m] = made(t);
+                    let (sin, cos) = (TAU * 20.0 * t + 0.3).sin_cos();
+                    match turns {
+                        true => [x * cos + y * sin, y * cos - x * sin, z, m],
+                        false => [x, y, z, m],
+                    }
+                }),
+            );
+            assert_eq!(
+                kinds(&analysis).contains(&ROTATING),
+                turns,
+                "{share:?} {:?}",
+                analysis.notices
+            );
+        }
+    }
+
+    #[test]
+    fn few_samples_a_tooth_are_told() {
+        let mut slot = cut(CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        });
+        let made = record(5.0, 5, milled([1.0, 1.0]));
+        let mut told = |rpm: f64| {
+            slot.spindle_rpm = rpm;
+            let analysis = read(&endmill(0.0, 90.0), &slot, &AS_IT_IS, &made);
+            let notice = analysis.notices.iter().find(|n| n.kind == FEW_SAMPLES);
+            notice.map(|n| n.detail.clone())
+        };
+        // 2 kHz over two teeth.
+        assert_eq!(told(6300.0).as_deref(), Some("9.5"));
+        assert_eq!(told(5700.0), None);
     }
 
     /// A hole 14 mm deep at 4 mm/s, its entry of 1.6 mm included, takes 3.9 s.

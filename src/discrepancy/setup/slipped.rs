@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::care::Origin;
 use super::group::FrfGroup;
 use super::mistake::{Distortion, turned_axis};
 use super::truth::Truth;
@@ -29,6 +30,24 @@ pub enum SmallError {
 }
 
 impl SmallError {
+    /// What each kind is an error of. `hits_repeat`: the hammer's direction is wrong alike at all postures.
+    pub fn origins(hits_repeat: bool) -> [Origin; 7] {
+        let hits = if hits_repeat {
+            Origin::Always
+        } else {
+            Origin::Files
+        };
+        [
+            Origin::Files,
+            Origin::Files,
+            hits,
+            Origin::Files,
+            Origin::Files,
+            Origin::Robot,
+            Origin::Robot,
+        ]
+    }
+
     /// Errors of one kind show the same care; from 0 on.
     pub fn kind(self) -> usize {
         match self {

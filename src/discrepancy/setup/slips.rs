@@ -75,7 +75,7 @@ pub fn absorb(
         let (expected, left) = (energy(&linear), energy(&rest));
         let after = AfterSlips {
             price: care.price,
-            unlikely: care.unlikely - care.kinship,
+            unlikely: care.surprise(&SmallError::origins(system.hits_repeat(&sizes))),
             evidence: care.evidence(before - left),
             known_to: (left - expected).abs(),
             rest,
@@ -228,6 +228,26 @@ impl<'a> System<'a> {
         sizes.rows_mut(0, own).copy_from(&followed);
         sizes.rows_mut(own, errors).copy_from(&care.sizes);
         Ok((sizes, care))
+    }
+
+    /// Whether most of what the directions of the hits are off by is the same at all postures.
+    fn hits_repeat(&self, sizes: &DVector<f64>) -> bool {
+        let (mut same, mut all) = (0.0, 0.0);
+        for (slip, start) in self.slips.iter().zip(&self.starts) {
+            if !matches!(slip.error, SmallError::Hit(_)) {
+                continue;
+            }
+            for axis in Axis::ALL {
+                let of_axis = slip.places.iter().enumerate();
+                let of_axis = of_axis.filter(|(_, g)| g.reference_axis == Some(axis));
+                let own: Vec<f64> = of_axis.map(|(place, _)| sizes[start + place]).collect();
+                if !own.is_empty() {
+                    same += own.iter().sum::<f64>().powi(2) / own.len() as f64;
+                    all += own.iter().map(|size| size * size).sum::<f64>();
+                }
+            }
+        }
+        2.0 * same > all
     }
 
     /// `rest` after `times` the change that the slopes foresee for `sizes`.

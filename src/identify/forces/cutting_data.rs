@@ -52,6 +52,8 @@ pub struct CutData {
     pub id: String,
     /// Rotation of the spindle, 1/min.
     pub spindle_rpm: f64,
+    /// Of its record, Hz.
+    pub sample_rate_hz: f64,
     /// At the tool's diameter (turning: the workpiece's), m/min.
     pub cutting_speed_m_per_min: f64,
     /// Per tooth (milling), per revolution (drilling, turning).
@@ -216,6 +218,7 @@ impl CutData {
         }
         let lines = standing_lines(&spectra, rate, cut.spindle_rpm / 60.0, orders > 0);
         let mut data = CutData {
+            sample_rate_hz: rate,
             cut: index,
             id: cut.id.clone(),
             spindle_rpm: cut.spindle_rpm,

@@ -55,6 +55,7 @@ pub(crate) fn cut(
         cut: index,
         id: format!("cut-{index}"),
         spindle_rpm: 3000.0,
+        sample_rate_hz: 10_000.0,
         cutting_speed_m_per_min: 113.0,
         feed_mm: feed_mm(geometry),
         setting: CutSetting {

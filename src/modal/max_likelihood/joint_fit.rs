@@ -50,6 +50,10 @@ const WIDEST: f64 = 0.1;
 const BESIDE_WIDTHS: f64 = 1.5;
 /// A pole comes in where it explains this times what a pole must explain to stay.
 const ADMITTED: f64 = 1.2;
+/// Its damping is within this factor of what is usual in the band, or within the larger one where it explains so many times as much.
+const ALIKE: f64 = 4.0;
+const UNLIKE: f64 = 10.0;
+const CLEARLY_THERE: f64 = 10.0;
 /// As [`CHANCE_SIGMA`] and [`LOOKED_EVERYWHERE`], for a pole that may be there.
 const DOUBT_SIGMA: f64 = 3.0;
 const DOUBT_LOOKED: f64 = 6.0;
@@ -501,8 +505,9 @@ impl PoleGroup<'_> {
             let fall = solution.misfit - more.misfit;
             let sane = (0..more.poles.len()).all(|j| self.sane(more, j));
             let added = more.poles[more.poles.len() - 1];
-            let alike = (usual / 4.0..usual * 4.0).contains(&added.damping_ratio);
-            sane && alike && fall > ADMITTED * self.wanted(more)
+            let within = |times: f64| (usual / times..usual * times).contains(&added.damping_ratio);
+            let wanted = ADMITTED * self.wanted(more);
+            sane && (within(ALIKE) && fall > wanted || within(UNLIKE) && fall > CLEARLY_THERE * wanted)
         };
         if let Some(more) = self.in_the_rest(solution).filter(enough) {
             return Some(more);

@@ -50,6 +50,11 @@ const UNLOADED: f64 = 1.5;
 const LEFT_OVER_NOISE: f64 = 3.0;
 /// … and beyond it this share of what was measured there.
 const LEFT_SHARE: f64 = 0.005;
+/// So many FRFs tell a broad mode from an error that goes on over many lines; fewer leave one doubtful whose damping ratio is so many
+/// times the median of the modes', and this large.
+const TELL_BROAD: usize = 3;
+const FAR_BROADER: f64 = 3.0;
+const BROAD: f64 = 0.03;
 /// Two fits of the same lines disagree from this many standard deviations on.
 const APART: f64 = 2.0;
 
@@ -365,6 +370,7 @@ pub(crate) fn collect(
             },
             moving: much || moves_slightly.is_some(),
             left_out_hz,
+            broad_hz: far_broader(&result.modes, data.len()),
             doubts,
             elsewhere_hz,
             own_hz,
@@ -373,6 +379,17 @@ pub(crate) fn collect(
         };
         result.quality = quality::judge_set(&found);
     }
+}
+
+/// The modes of a set of very few FRFs that are far broader than most.
+fn far_broader(modes: &[GlobalMode], frfs: usize) -> Vec<f64> {
+    if frfs >= TELL_BROAD {
+        return Vec::new();
+    }
+    let usual = crate::signal::median(&modes.iter().map(|m| m.damping_ratio).collect::<Vec<_>>());
+    let far = (FAR_BROADER * usual).max(BROAD);
+    let broad = modes.iter().filter(|m| m.damping_ratio > far);
+    broad.map(|m| m.frequency_hz).collect()
 }
 
 /// Powers where a pole was left out, in its half-power band, summed over the FRFs.
@@ -726,6 +743,30 @@ pub(crate) fn coarse_lines(data: &[Data], result: &mut GlobalModes) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn broad_modes_of_one_or_two_frfs_are_doubtful() {
+        let modes = |damping: &[f64]| -> Vec<GlobalMode> {
+            let of = |(k, zeta): (usize, &f64)| GlobalMode {
+                frequency_hz: 10.0 * (k + 1) as f64,
+                damping_ratio: *zeta,
+                frequency_std_hz: 0.01,
+                damping_std: 1e-4,
+                found_in: 1,
+                lines_in_half_power_band: 5.0,
+                complexity: None,
+                shape: Vec::new(),
+                constants: Vec::new(),
+            };
+            damping.iter().enumerate().map(of).collect()
+        };
+        let with_one_broad = modes(&[0.01, 0.012, 0.08, 0.009]);
+        assert_eq!(far_broader(&with_one_broad, 2), [30.0]);
+        assert!(far_broader(&with_one_broad, 3).is_empty());
+        assert!(far_broader(&modes(&[0.05, 0.08, 0.06]), 1).is_empty());
+        assert!(far_broader(&modes(&[0.005, 0.025, 0.006]), 1).is_empty());
+        assert!(far_broader(&[], 1).is_empty());
+    }
 
     #[test]
     fn what_is_left_where_a_pole_was_left_out_counts_beyond_the_noise_only() {

@@ -1031,10 +1031,7 @@ mod tests {
             let crate::cutting::measured::cut_analysis::Average { value, std_error } =
                 analysis.averages[2].unwrap();
             let part = if told.is_some() { growth / 3.0 } else { 0.0 };
-            assert!(
-                (std_error / value - part).abs() < 1e-3 + 0.1 * part,
-                "{std_error} of {value}"
-            );
+            assert!((std_error / value - part).abs() < 0.01, "{std_error} of {value}");
             told.map(|n| n.detail.clone())
         };
         // The last third against the first: two thirds of the growth.

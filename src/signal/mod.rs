@@ -24,7 +24,8 @@ pub(crate) use faults::least_and_greatest;
 pub use faults::{Clipping, Faults, find_faults, samples_in};
 pub use mains::{MAINS_HZ, from_mains_hz};
 pub use order_spectrum::{
-    OrderSpectrum, highest_order, line_amplitude, mean_between, order_spectrum, order_spectrum_above,
+    OrderSpectrum, highest_order, highest_order_seen_whole, line_amplitude, mean_between, order_spectrum,
+    order_spectrum_above,
 };
 pub use pulses::pulsed_channel;
 pub use spindle_track::{SpindleTrack, spindle_track};

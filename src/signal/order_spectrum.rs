@@ -39,11 +39,23 @@ const MANY_REVOLUTIONS: f64 = 8.0;
 const STANDS_OUT: f64 = 2.0;
 
 /// Share of the sampling rate up to which what is sampled is seen whole: an anti-aliasing filter rolls off from there.
-pub const SEEN_WHOLE: f64 = 0.4;
+const SEEN_WHOLE: f64 = 0.4;
+
+/// Highest order worth comparing with a model of so many teeth: as [`highest_order`], but where a filter may already take of the tooth
+/// passing itself, what lies below.
+pub fn highest_order_seen_whole(samples_per_revolution: f64, teeth: usize, wanted: usize) -> usize {
+    let whole = SEEN_WHOLE * samples_per_revolution;
+    let highest = highest_order(samples_per_revolution, wanted);
+    if whole < teeth as f64 {
+        highest.min(whole.max(0.0) as usize)
+    } else {
+        highest
+    }
+}
 
 /// Highest order worth keeping: `wanted`, or what the sampling shows.
 pub fn highest_order(samples_per_revolution: f64, wanted: usize) -> usize {
-    wanted.min((SEEN_WHOLE * samples_per_revolution).floor().max(0.0) as usize)
+    wanted.min((0.45 * samples_per_revolution).floor().max(0.0) as usize)
 }
 
 /// Samples that are transformed at once, at most: a longer window's lines are the mean power of its pieces, so that memory does not
@@ -429,6 +441,14 @@ mod tests {
     use super::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_tooth_passing_that_a_filter_may_take_of_is_not_compared() {
+        assert_eq!(highest_order_seen_whole(9.0, 4, 64), 3);
+        assert_eq!(highest_order_seen_whole(11.0, 4, 64), 4);
+        assert_eq!(highest_order_seen_whole(100.0, 4, 64), 45);
+        assert_eq!(highest_order_seen_whole(100.0, 4, 24), 24);
+    }
 
     #[test]
     fn lines_noise_and_drift_are_told_apart() {

@@ -16,7 +16,7 @@ use crate::identify::forces::asynchronous_lines::{
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
 use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
-use crate::signal::{MAINS_HZ, SpindleTrack, highest_order, line_amplitude, order_spectrum_above};
+use crate::signal::{MAINS_HZ, SpindleTrack, highest_order_seen_whole, line_amplitude, order_spectrum_above};
 use crate::{Error, InputError, Result};
 
 /// What was cut.
@@ -118,7 +118,9 @@ impl CutData {
         let window = Windows::new(analysis, record, per_turn);
         let milling = MillingCut::new(tool, &cut.geometry);
         let orders = match &milling {
-            Some(m) => highest_order(per_turn, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS)),
+            Some(m) => {
+                highest_order_seen_whole(per_turn, m.teeth, (ORDERS_PER_TOOTH * m.teeth).min(MOST_ORDERS))
+            }
             None => 0,
         };
         let mut spectra = Vec::new();

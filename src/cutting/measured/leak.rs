@@ -137,7 +137,7 @@ mod tests {
         let found = told(&[[-100.0, 18.0], [400.0, -72.5]]).unwrap();
         assert!(found.contains("18 %") && found.contains("about 10 s"), "{found}");
         let fast = told(&[[-100.0, 130.0], [400.0, -510.0]]).unwrap();
-        assert!(fast.contains("no longer than the cut's 2 s"), "{fast}");
+        assert!(fast.contains("no longer than the cut's 2.0 s"), "{fast}");
         // One alone, along the force, of other shares, or none.
         assert_eq!(told(&[[400.0, -72.0]]), None);
         assert_eq!(told(&[[-100.0, -18.0], [400.0, 72.5]]), None);

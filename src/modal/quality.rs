@@ -264,6 +264,12 @@ pub(super) struct SetFindings {
     pub converged: bool,
 }
 
+/// Frequencies in a row, Hz; `None` where there are none.
+fn listed(hz: &[f64]) -> Option<String> {
+    let each: Vec<String> = hz.iter().map(|f| format!("{f:.2}")).collect();
+    (!each.is_empty()).then(|| each.join(", "))
+}
+
 /// Judges the modes of a set.
 pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
     let power = &found.power;
@@ -319,25 +325,21 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             ),
         );
     }
-    if !found.left_out_hz.is_empty() {
-        let places: Vec<String> = found.left_out_hz.iter().map(|f| format!("{f:.2}")).collect();
+    if let Some(places) = listed(&found.left_out_hz) {
         note(
             QualityGrade::Doubtful,
             format!(
-                "what was left out at {} Hz may be a mode: the others do not explain what was measured there (why it was left out: \
-                 --json)",
-                places.join(", ")
+                "what was left out at {places} Hz may be a mode: the others do not explain what was measured there (why it was left out: \
+                 --json)"
             ),
         );
     }
-    if !found.broad_hz.is_empty() {
-        let places: Vec<String> = found.broad_hz.iter().map(|f| format!("{f:.2}")).collect();
+    if let Some(places) = listed(&found.broad_hz) {
         note(
             QualityGrade::Doubtful,
             format!(
-                "far broader than the other modes, in too few FRFs to tell a mode from an error of the measurement: {} Hz (more response \
-                 points would tell)",
-                places.join(", ")
+                "far broader than the other modes, in too few FRFs to tell a mode from an error of the measurement: {places} Hz (more response \
+                 points would tell)"
             ),
         );
     }
@@ -347,35 +349,29 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
             "there may be one more mode close to another".into(),
         );
     }
-    if !found.elsewhere_hz.is_empty() {
-        let places: Vec<String> = found.elsewhere_hz.iter().map(|f| format!("{f:.2}")).collect();
+    if let Some(places) = listed(&found.elsewhere_hz) {
         note(
             QualityGrade::Doubtful,
             format!(
-                "the common fit has {} Hz elsewhere than the FRFs by themselves, which were taken: it lacks something there (a \
-                 narrower --band may help)",
-                places.join(", ")
+                "the common fit has {places} Hz elsewhere than the FRFs by themselves, which were taken: it lacks something there (a \
+                 narrower --band may help)"
             ),
         );
     }
-    if !found.own_hz.is_empty() {
-        let places: Vec<String> = found.own_hz.iter().map(|f| format!("{f:.2}")).collect();
+    if let Some(places) = listed(&found.own_hz) {
         note(
             QualityGrade::Doubtful,
             format!(
-                "the common fit has no mode at {} Hz, where the FRFs have one by themselves, which was taken (a narrower --band may \
-                 help)",
-                places.join(", ")
+                "the common fit has no mode at {places} Hz, where the FRFs have one by themselves, which was taken (a narrower --band may \
+                 help)"
             ),
         );
     }
-    if !found.missed_hz.is_empty() {
-        let places: Vec<String> = found.missed_hz.iter().map(|f| format!("{f:.2}")).collect();
+    if let Some(places) = listed(&found.missed_hz) {
         note(
             QualityGrade::Doubtful,
             format!(
-                "clear peaks that the FRFs have by themselves are not among the common modes: {} Hz (a narrower --band may help)",
-                places.join(", ")
+                "clear peaks that the FRFs have by themselves are not among the common modes: {places} Hz (a narrower --band may help)"
             ),
         );
     }

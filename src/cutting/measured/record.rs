@@ -893,6 +893,7 @@ mod tests {
     }
 
     use crate::cutting::made_tools::{drill, endmill};
+    use crate::cutting::measured::cut_analysis::Average;
     use crate::data::{Channel, Immersion};
     use approx::assert_relative_eq;
     use std::f64::consts::TAU;
@@ -1028,8 +1029,7 @@ mod tests {
             let analysis = read(&endmill(0.4, 95.0), &bar, &AS_IT_IS, &record);
             let told = analysis.notices.iter().find(|n| n.kind == UNSTEADY_CUT);
             // What is told is uncertain by half of it.
-            let crate::cutting::measured::cut_analysis::Average { value, std_error } =
-                analysis.averages[2].unwrap();
+            let Average { value, std_error } = analysis.averages[2].unwrap();
             let part = if told.is_some() { growth / 3.0 } else { 0.0 };
             assert!((std_error / value - part).abs() < 0.01, "{std_error} of {value}");
             told.map(|n| n.detail.clone())
@@ -1038,6 +1038,21 @@ mod tests {
         assert_eq!(told(0.3).as_deref(), Some("by +17 %"));
         assert_eq!(told(0.1).as_deref(), Some("by +6 %"));
         assert_eq!(told(0.05), None);
+    }
+
+    fn slot() -> Cut {
+        cut(CutGeometry::Milling {
+            feed_per_tooth_mm: 0.1,
+            axial_depth_mm: 2.0,
+            immersion: Immersion::SLOT,
+        })
+    }
+
+    fn straight_mill() -> Tool {
+        Tool {
+            helix_deg: 0.0,
+            ..endmill(0.0, 90.0)
+        }
     }
 
     /// A slot milled by two teeth of a straight edge; `share`: of the common chip that each tooth takes.
@@ -1064,13 +1079,7 @@ mod tests {
     /// A missing tooth leaves its chip to the other; on a dynamometer that lies the other way round it is missing as well.
     #[test]
     fn a_tooth_that_does_not_cut_is_told_whatever_way_the_dynamometer_lies() {
-        let slot = cut(CutGeometry::Milling {
-            feed_per_tooth_mm: 0.1,
-            axial_depth_mm: 2.0,
-            immersion: Immersion::SLOT,
-        });
-        let mut tool = endmill(0.0, 90.0);
-        tool.helix_deg = 0.0;
+        let (slot, tool) = (slot(), straight_mill());
         // Recorded x is the tool's y, recorded y its −x.
         let turned = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], AS_IT_IS[2]];
         for share in [[1.0, 1.0], [0.0, 2.0]] {
@@ -1102,13 +1111,7 @@ mod tests {
     /// Forces as a dynamometer in the spindle records them; runout, which leaves the mean, and a plain slot are none.
     #[test]
     fn forces_that_turn_with_the_tool_are_told() {
-        let slot = cut(CutGeometry::Milling {
-            feed_per_tooth_mm: 0.1,
-            axial_depth_mm: 2.0,
-            immersion: Immersion::SLOT,
-        });
-        let mut tool = endmill(0.0, 90.0);
-        tool.helix_deg = 0.0;
+        let (slot, tool) = (slot(), straight_mill());
         for (share, turns) in [([1.0, 1.0], true), ([1.0, 1.0], false), ([0.7, 1.3], false)] {
             let made = milled(share);
             let analysis = read(
@@ -1135,11 +1138,7 @@ mod tests {
 
     #[test]
     fn few_samples_a_tooth_are_told() {
-        let mut slot = cut(CutGeometry::Milling {
-            feed_per_tooth_mm: 0.1,
-            axial_depth_mm: 2.0,
-            immersion: Immersion::SLOT,
-        });
+        let mut slot = slot();
         let made = record(5.0, 5, milled([1.0, 1.0]));
         let mut told = |rpm: f64| {
             slot.spindle_rpm = rpm;

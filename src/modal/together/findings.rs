@@ -77,8 +77,7 @@ pub(crate) fn collect(
         .collect();
     let (mut scatters, mut moving) = (Vec::new(), 0);
     let mut elsewhere_hz = Vec::new();
-    let parts = verify::parts_of_others(fitted, groups);
-    let complex_modes = verify::complex_modes(fitted, groups);
+    let complex_poles = verify::complex_poles(fitted, groups);
     let (mut movements, mut moved, mut complex_hz) = (Vec::new(), Vec::new(), Vec::new());
     let lines_hz = || data.iter().flat_map(|d| d.frequency_hz.iter().copied());
     let (first_hz, last_hz) = (
@@ -116,7 +115,7 @@ pub(crate) fn collect(
                 result.rejected.push(RejectedMode::new(pole, reason));
                 continue;
             }
-            if parts.contains(&(g, j)) {
+            if complex_poles.parts_of_others.contains(&(g, j)) {
                 result.rejected.push(RejectedMode::new(
                     pole,
                     "its FRFs have no common phase where those of the other modes have: a part of its neighbours, which move or bend",
@@ -254,7 +253,7 @@ pub(crate) fn collect(
                 continue;
             }
             let shape = shape_of(&known, members);
-            if complex_modes.contains(&(g, j)) {
+            if complex_poles.modes.contains(&(g, j)) {
                 complex_hz.push(frequency_hz);
             }
             let movement = verify::movement(solution, j);

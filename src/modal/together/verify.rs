@@ -249,20 +249,32 @@ fn one_place(data: &[Data], groups: &[Group]) -> bool {
     likeness.len() >= OTHERS && crate::signal::median(&likeness) > SAME_SHAPE
 }
 
-/// The poles, by group and number, that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have
-/// common phases: parts of those which the model of one mode does not hold. They stay in the fit: what they stand for would do harm to
-/// the others.
-pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, usize)> {
-    if data.len() < ENOUGH_FRFS || !common_phase(data, groups) {
-        return Vec::new();
-    }
-    let mut found = Vec::new();
+/// The poles without a common phase, by group and number.
+#[derive(Default)]
+pub(super) struct ComplexPoles {
+    /// Modes all the same: see [`Witness`].
+    pub modes: Vec<(usize, usize)>,
+    /// Those that have phases by chance next to a stronger one, or that others cancel, in a set whose modes have common phases: parts
+    /// of those which the model of one mode does not hold. They stay in the fit: what they stand for would do harm to the others.
+    pub parts_of_others: Vec<(usize, usize)>,
+}
+
+pub(super) fn complex_poles(data: &[Data], groups: &[Group]) -> ComplexPoles {
+    let phases_tell = data.len() >= ENOUGH_FRFS && common_phase(data, groups);
+    let mut found = ComplexPoles::default();
     let at_once = displaced_at_once(groups);
     for (g, group) in groups.iter().enumerate() {
         let poles = &group.solution.poles;
         let all: Vec<Candidate> = (0..poles.len()).map(|j| Candidate::new(data, group, j)).collect();
         let witness = Witness::new(data, group, &at_once);
-        for (j, candidate) in all.iter().enumerate().filter(|(_, c)| c.mpc() < BY_CHANCE) {
+        for (j, candidate) in all.iter().enumerate().filter(|(_, c)| c.mpc() < shape::COLLINEAR) {
+            if witness.bears_out(candidate) {
+                found.modes.push((g, j));
+                continue;
+            }
+            if !phases_tell || candidate.mpc() >= BY_CHANCE {
+                continue;
+            }
             let mut beside = (0..poles.len())
                 .filter(|&k| k != j && neighbours(data, poles[j], poles[k]))
                 .peekable();
@@ -276,8 +288,8 @@ pub(super) fn parts_of_others(data: &[Data], groups: &[Group]) -> Vec<(usize, us
                 }),
                 None => cancelled,
             };
-            if is_part && !witness.bears_out(candidate) {
-                found.push((g, j));
+            if is_part {
+                found.parts_of_others.push((g, j));
             }
         }
     }
@@ -369,22 +381,6 @@ impl<'a> Witness<'a> {
             0.0
         }
     }
-}
-
-/// The poles, by group and number, whose shape is complex and which are modes all the same.
-pub(super) fn complex_modes(data: &[Data], groups: &[Group]) -> Vec<(usize, usize)> {
-    let mut found = Vec::new();
-    let at_once = displaced_at_once(groups);
-    for (g, group) in groups.iter().enumerate() {
-        let witness = Witness::new(data, group, &at_once);
-        for j in 0..group.solution.poles.len() {
-            let candidate = Candidate::new(data, group, j);
-            if candidate.mpc() < shape::COLLINEAR && witness.bears_out(&candidate) {
-                found.push((g, j));
-            }
-        }
-    }
-    found
 }
 
 /// What speaks against a pole. `borne_out`: whether phases of its own do not.

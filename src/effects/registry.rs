@@ -29,6 +29,7 @@ use super::structural::contact::ToolContact;
 use super::structural::joint_damping::JointDamping;
 use super::structural::joint_transverse_compliance::JointTransverseCompliance;
 use super::structural::joints::bearing_compliance::BearingCompliance;
+use super::structural::joints::counterbalance::Counterbalance;
 use super::structural::joints::drive_dynamics::DriveDynamics;
 use super::structural::joints::hysteretic_damping::HystereticDamping;
 use super::structural::joints::thermal_drift::ThermalDrift;
@@ -36,12 +37,13 @@ use super::structural::link_flexibility::LinkFlexibility;
 use super::structural::load_dependent_stiffness::LoadDependentStiffness;
 use super::structural::local_resonator::LocalResonator;
 use super::structural::payload::Payload;
+use super::structural::payload_inertia::PayloadInertia;
 use super::structural::sensor_misalignment::SensorMisalignment;
 use super::structural::time_delay::TimeDelay;
 use super::structural::tool_flexibility::ToolFlexibility;
 
 /// All effects on the structure, in the order in which they are tried.
-pub const STRUCTURAL: [&dyn Effect<Structure>; 17] = [
+pub const STRUCTURAL: [&dyn Effect<Structure>; 19] = [
     &LinkFlexibility,
     &JointTransverseCompliance,
     &BaseCompliance,
@@ -59,6 +61,8 @@ pub const STRUCTURAL: [&dyn Effect<Structure>; 17] = [
     &ThermalDrift,
     &BearingCompliance,
     &BaseMounting,
+    &Counterbalance,
+    &PayloadInertia,
 ];
 
 /// Effects on the structure whose form the data drew: added on request, not tried by `diagnose`.

@@ -13,6 +13,7 @@ pub(crate) mod link_flexibility;
 pub(crate) mod load_dependent_stiffness;
 pub(crate) mod local_resonator;
 pub(crate) mod payload;
+pub(crate) mod payload_inertia;
 pub(crate) mod sensor_misalignment;
 pub(crate) mod time_delay;
 pub(crate) mod tool_flexibility;

@@ -133,7 +133,7 @@ impl Match {
 }
 
 /// Effects that such a table cannot show, with the reason.
-const INVISIBLE: [(&str, &str); 9] = [
+const INVISIBLE: [(&str, &str); 11] = [
     ("time-delay", "a table of resonances holds no phase"),
     (
         "sensor-misalignment",
@@ -165,6 +165,14 @@ const INVISIBLE: [(&str, &str); 9] = [
     ),
     (
         "base-mounting",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
+    ),
+    (
+        "counterbalance",
+        "a table of resonances holds too few numbers to choose among rarer places as well",
+    ),
+    (
+        "payload-inertia",
         "a table of resonances holds too few numbers to choose among rarer places as well",
     ),
 ];

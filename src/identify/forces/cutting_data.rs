@@ -437,6 +437,39 @@ impl CuttingData {
         own
     }
 
+    /// One cut milled or drilled with `factor` times the stated feed.
+    #[must_use]
+    pub fn with_feed_of(&self, cut: usize, factor: f64) -> Self {
+        let mut own = self.clone();
+        let cut = Arc::make_mut(&mut own.cuts[cut]);
+        cut.feed_mm *= factor;
+        cut.setting.feed_mm *= factor;
+        match &mut cut.kind {
+            CutKind::Milling { cut: milling, unit } => {
+                milling.feed_per_tooth_mm *= factor;
+                **unit = milling.linear(cut.orders);
+            }
+            CutKind::Drilling { cut: hole, .. } => {
+                hole.geometry.feed_per_rev_mm *= factor;
+                hole.feed_mm_per_s *= factor;
+            }
+            CutKind::Turning { .. } => {}
+        }
+        own
+    }
+
+    /// One cut milled `factor` times as deep as stated.
+    #[must_use]
+    pub fn with_depth_of(&self, cut: usize, factor: f64) -> Self {
+        let mut own = self.clone();
+        let cut = Arc::make_mut(&mut own.cuts[cut]);
+        if let CutKind::Milling { cut: milling, unit } = &mut cut.kind {
+            *milling = milling.deeper(factor);
+            **unit = milling.linear(cut.orders);
+        }
+        own
+    }
+
     /// Numbers compared.
     pub fn value_count(&self) -> usize {
         self.cuts.iter().map(|c| c.value_count()).sum()

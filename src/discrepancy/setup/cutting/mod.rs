@@ -19,7 +19,7 @@ use super::readings::Turn;
 use crate::Result;
 use crate::data::Process;
 use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
-use crate::identify::{CuttingData, CuttingModel};
+use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
 use crate::signal::SpindleTrack;
 use crate::text::listed;
 use direction::milling_direction;
@@ -27,6 +27,10 @@ use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improb
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
+/// Cuts of which one may be said to be other than stated: of fewer each could be the one.
+const FEWEST_CUTS: usize = 4;
+/// Cuts that a wrong feed or depth is looked for in: a wrong one pulls at the coefficients and need not be the worst itself.
+const WORST_CUTS: usize = 3;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
 
@@ -91,6 +95,10 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     }
     if data.process != Process::Milling {
         check.findings.extend(drilling_signs(data)?);
+        if let (true, Some(base)) = (check.findings.is_empty(), fit(data)) {
+            let changes = worst_cuts(data, &base)?.into_iter().map(Change::FeedOf);
+            try_changes(data, &base, &changes.collect::<Vec<_>>(), rival, &mut check);
+        }
         return Ok(check);
     }
     // At a wrong speed the waveform is none, and any reading of it fits as badly as any other.
@@ -110,10 +118,7 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     }
     let base = base?;
     check.reduced_chi2 = base.reduced_chi2;
-    if base.reduced_chi2 < SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64) {
-        return Ok(check);
-    }
-    let changes: Vec<Change> = [
+    let mut changes: Vec<Change> = [
         Change::GainOfY,
         Change::SpeedWander {
             steady_in_time: false,
@@ -123,7 +128,25 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
         Change::LowPass { order: 2 },
     ]
     .into();
+    for cut in worst_cuts(data, &base)? {
+        changes.extend([Change::FeedOf(cut), Change::DepthOf(cut)]);
+    }
+    try_changes(data, &base, &changes, rival, &mut check);
+    Ok(check)
+}
+
+/// Adds what `changes` explain of the misfit that the model has, fitted (`base`), where it has more than noise leaves.
+fn try_changes(
+    data: &CuttingData,
+    base: &Calibration,
+    changes: &[Change],
+    rival: impl FnOnce() -> Option<Rival>,
+    check: &mut SetupCheck,
+) {
     let values = data.value_count();
+    if base.reduced_chi2 < SUSPICIOUS.min(1.0 + 30.0 / values as f64) {
+        return;
+    }
     let rivals = || Rivals {
         library: rival(),
         small_errors: None,
@@ -143,7 +166,6 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
         check.explained_share = decision.explained_share;
         check.findings.extend(decision.findings);
     }
-    Ok(check)
 }
 
 fn read(data: &CuttingData, turn: Turn) -> CuttingData {
@@ -270,6 +292,10 @@ enum Change {
     SpeedWander { steady_in_time: bool },
     /// Time constant of the amplifiers, s.
     LowPass { order: u8 },
+    /// Logarithm of the true feed of one cut over the stated one.
+    FeedOf(usize),
+    /// Logarithm of the true depth of one cut over the stated one.
+    DepthOf(usize),
 }
 
 impl Change {
@@ -277,6 +303,8 @@ impl Change {
     fn undone(self, data: &CuttingData, value: f64) -> CuttingData {
         let mut own = data.clone();
         match self {
+            Change::FeedOf(cut) => return data.with_feed_of(cut, value.exp()),
+            Change::DepthOf(cut) => return data.with_depth_of(cut, value.exp()),
             Change::GainOfY => {
                 let channel = 1;
                 for row in &mut own.tool_from_dyno {
@@ -333,6 +361,7 @@ impl Change {
             } => [0.0, 5e-3, 2e-2, 5e-2],
             Change::SpeedWander { steady_in_time: true } => [0.0, 5e-5, 2e-4, 5e-4],
             Change::LowPass { .. } => [0.0, 5e-5, 2e-4, 6e-4],
+            Change::FeedOf(_) | Change::DepthOf(_) => [-0.7, -0.2, 0.2, 0.7],
         }
     }
 
@@ -345,6 +374,7 @@ impl Change {
             } => [0.0, 0.3],
             Change::SpeedWander { steady_in_time: true } => [0.0, 3e-3],
             Change::LowPass { .. } => [0.0, 0.01],
+            Change::FeedOf(_) | Change::DepthOf(_) => [-2.5, 2.5],
         }
     }
 
@@ -392,6 +422,10 @@ impl Change {
         }
         let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
         let finding = match self {
+            Change::FeedOf(cut) => other_than_stated(&data.cuts[cut].id, "feed-override", "feed", value, std),
+            Change::DepthOf(cut) => {
+                other_than_stated(&data.cuts[cut].id, "axial-depth", "axial depth", value, std)
+            }
             Change::GainOfY => {
                 let factor = value.exp();
                 let error = factor * std;
@@ -450,10 +484,46 @@ impl Change {
             finding,
             chi2,
             parameters: 1,
-            tried: 4.0,
+            tried: match self {
+                Change::FeedOf(_) | Change::DepthOf(_) => 2.0 * data.cuts.len() as f64,
+                _ => 4.0,
+            },
             at_bound: false,
         })
     }
+}
+
+/// A cut whose `what` was not as stated but the exponential of `value` times that.
+fn other_than_stated(id: &str, kind: &'static str, what: &str, value: f64, std: f64) -> SetupFinding {
+    let factor = value.exp();
+    let error = factor * std;
+    SetupFinding {
+        kind,
+        place: format!("cut {id}"),
+        value: Some(factor),
+        std_error: Some(error),
+        unit: "1",
+        confidence: 0.0,
+        remedy: format!(
+            "Look what {what} cut {id} was made with (the override knob, a line of the program, a slip in the cut list): its forces are \
+             those of {} times the stated one. Write the true one down, or leave the cut out.",
+            with_error(factor, error)
+        ),
+    }
+}
+
+/// Cuts that a wrong value is looked for in: those that fit worst, by index.
+fn worst_cuts(data: &CuttingData, now: &Calibration) -> Result<Vec<usize>> {
+    if data.cuts.len() < FEWEST_CUTS {
+        return Ok(Vec::new());
+    }
+    let model = CuttingModel::new(data, true)?;
+    let fits = CuttingProblem { model: &model, data }.fits(&now.theta)?;
+    let misfit = |i: usize| fits[i].chi2 / data.cuts[i].value_count().max(1) as f64;
+    let mut cuts: Vec<usize> = (0..data.cuts.len()).collect();
+    cuts.sort_by(|a, b| misfit(*b).total_cmp(&misfit(*a)));
+    cuts.truncate(WORST_CUTS);
+    Ok(cuts)
 }
 
 /// Second derivative of the parabola through three points.
@@ -482,6 +552,7 @@ fn vertex(points: &[(f64, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::forces::made_cuts::{METAL, drilled, milled};
 
     #[test]
     fn the_vertex_of_a_parabola_is_found() {
@@ -489,6 +560,47 @@ mod tests {
         let points = [-1.0, 0.2, 2.0].map(|x| (x, f(x)));
         assert!((vertex(&points).unwrap() - 0.7).abs() < 1e-12);
         assert!((curvature(&points).unwrap() - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cut_that_was_not_made_as_the_list_says_is_named_with_what_it_was_made_with() {
+        let ways =
+            [0.05, 0.1, 0.15].map(|feed| [[feed, 1.0, 0.0, 180.0, 0.4], [feed, 2.0, 90.0, 180.0, -0.7]]);
+        let made = milled(METAL, &ways.concat());
+        assert_eq!(examine_cutting(&made, || None).unwrap().findings, []);
+        // What the list says is the true value over the factor.
+        for (cut, factor) in [(0, 0.8), (3, 1.25), (5, 0.5)] {
+            let listed = [
+                ("feed-override", made.with_feed_of(cut, 1.0 / factor)),
+                ("axial-depth", made.with_depth_of(cut, 1.0 / factor)),
+            ];
+            for (kind, listed) in listed {
+                let findings = examine_cutting(&listed, || None).unwrap().findings;
+                let found = &findings[0];
+                assert_eq!(
+                    (found.kind, &found.place),
+                    (kind, &format!("cut {}", listed.cuts[cut].id)),
+                    "{findings:?}"
+                );
+                assert!(found.confidence > 0.9, "{found:?}");
+                approx::assert_relative_eq!(found.value.unwrap(), factor, max_relative = 1e-2);
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_that_was_not_drilled_with_the_stated_feed_is_named() {
+        let holes = [[0.1, 4.0], [0.15, 4.0], [0.2, 4.0], [0.1, 0.0], [0.2, 0.0]];
+        let made = drilled([800.0, 20.0, 500.0, 30.0], &holes);
+        let listed = made.with_feed_of(1, 1.0 / 0.7);
+        let findings = examine_cutting(&listed, || None).unwrap().findings;
+        let found = &findings[0];
+        assert_eq!(
+            (found.kind, found.place.as_str()),
+            ("feed-override", "cut cut-1"),
+            "{findings:?}"
+        );
+        approx::assert_relative_eq!(found.value.unwrap(), 0.7, max_relative = 3e-2);
     }
 
     #[test]

@@ -8,12 +8,17 @@
 use std::f64::consts::TAU;
 
 use super::setup::CARE;
+use crate::identify::own_errors::OwnErrors;
 use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
 
 /// Probability that the errors of the setup are large enough to be seen.
 const VISIBLE_ERRORS: f64 = 0.1;
 /// Probability that a setup has no small errors but those that are fitted: then nothing is left of them.
 const ALL_FITTED: f64 = 0.9;
+/// Probability that each FRF has errors of its own besides noise that are large enough to be seen.
+const OWN_ERRORS: f64 = 0.5;
+/// Share of such errors that small errors of the setup take at most, for they follow none of them.
+const TAKEN_OF_OWN: f64 = 0.5;
 /// Probability that the law of an effect that is there is right to this part of its force only, or where it acts is: what it explains
 /// a thousand times over leaves as much.
 const NEARLY_RIGHT: f64 = 0.1;
@@ -90,11 +95,27 @@ fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
     // The laboratory's care is a factor (log-normal), and its errors have sizes that are more or less likely together.
     let found = -0.5 * (TAU * CARE * CARE).ln() - beyond.unlikely - largest.excess.ln();
     let excess = after.excess.max(0.0);
-    let left = [
+    let mut left = vec![
         ALL_FITTED.ln() + log_normal(excess, after.std),
         (1.0 - ALL_FITTED).ln() + log_density(excess, after.std, rest.small_errors, exponential),
     ];
-    Some(found + log_sum(&left))
+    let own = beyond.own_errors;
+    left.extend(own.map(|own| of_own_errors(excess, &own, rest)));
+    let mut ways = vec![found + log_sum(&left)];
+    // Errors of each curve alone, and hardly any others.
+    ways.extend(
+        own.filter(|_| excess > (1.0 - TAKEN_OF_OWN) * largest.excess)
+            .map(|own| of_own_errors(largest.excess, &own, rest) - (TAKEN_OF_OWN * largest.excess).ln()),
+    );
+    Some(log_sum(&ways))
+}
+
+/// ln of the density of what slips leave, if each curve has errors of its own: their size is about the usual one, or some times that.
+fn of_own_errors(excess: f64, own: &OwnErrors, rest: &Rest) -> f64 {
+    let excess = excess.max(f64::MIN_POSITIVE);
+    // Energy goes with the square of the size.
+    let size = 0.5 * (excess / rest.small_errors.max(f64::MIN_POSITIVE)).ln();
+    OWN_ERRORS.ln() + own.log_factor() + log_normal(size, CARE) - (2.0 * excess).ln()
 }
 
 /// Odds that something the library does not have is behind what a model leaves, against the small errors of the setup.
@@ -340,8 +361,31 @@ mod tests {
             unlikely,
             evidence: 0.5 * (excess - after),
             known_to: 0.0,
+            own_errors: None,
         });
         rest
+    }
+
+    #[test]
+    fn what_no_two_frfs_have_in_common_is_no_physics() {
+        let with_own = |common: f64, excess: f64| {
+            let mut rest = with_slips(excess, 0.95 * excess, 1.0);
+            rest.small_errors = 2e4;
+            let beyond = rest.beyond_slips.as_mut().unwrap();
+            beyond.own_errors = Some(OwnErrors {
+                common,
+                common_std: 0.05,
+                of_a_place: 0.01,
+                of_a_place_std: 0.003,
+            });
+            rest
+        };
+        assert!(odds_against_slips(&with_own(0.0, 2e4)) < 0.3);
+        assert!(odds_against_slips(&with_own(0.5, 2e4)) > 1.0);
+        // Of many times the usual size they are something else.
+        assert!(odds_against_slips(&with_own(0.0, 2e7)) > 1.0);
+        // Beside an effect they are excused.
+        assert!(odds(1e5, &with_own(0.0, 2e4)) < 0.3 * odds(1e5, &with_own(0.5, 2e4)));
     }
 
     #[test]

@@ -383,6 +383,7 @@ mod tests {
                 unlikely: 1.0,
                 evidence,
                 known_to: 0.0,
+                own_errors: None,
             }),
         }
     }

@@ -8,6 +8,7 @@ pub mod frfs;
 pub mod levenberg_marquardt;
 pub mod model;
 pub mod model_history;
+pub mod own_errors;
 pub mod resonances;
 pub mod rest;
 pub mod rest_patterns;

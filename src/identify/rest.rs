@@ -4,6 +4,8 @@ use num_complex::Complex64;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::own_errors::OwnErrors;
+
 /// The rest of one measured curve.
 #[derive(Debug, Clone)]
 pub struct RestCurve {
@@ -41,6 +43,8 @@ pub struct BeyondSlips {
     pub evidence: f64,
     /// Σ r²/σ² to which their effect on the FRFs was worked out.
     pub known_to: f64,
+    /// Whether what is left is each curve's own; `None` where that cannot be told.
+    pub own_errors: Option<OwnErrors>,
 }
 
 impl BeyondSlips {
@@ -104,13 +108,30 @@ impl Rest {
     /// What is left in words, where the small errors of a setup explain nearly all of it.
     pub fn excuse_in_words(&self) -> Option<String> {
         let largest = self.largest()?;
-        let share = self.share_of_slips().filter(|_| self.is_mostly_slips())?;
+        if !self.is_mostly_slips() {
+            return self.own_errors_in_words(largest);
+        }
+        let share = self.share_of_slips()?;
         Some(format!(
             "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it (angles of joints, sensors and hits, gain \
              of the hammer, stiffness from posture to posture, warming up)",
             100.0 * self.share_of_signal(largest.excess),
             100.0 * share,
         ))
+    }
+
+    /// The same where each curve has errors of its own.
+    fn own_errors_in_words(&self, largest: &RestTest) -> Option<String> {
+        /// ln of a Bayes factor from which on it is said.
+        const SAID: f64 = 2.0;
+        let own = self.beyond_slips.as_ref()?.own_errors?;
+        (own.log_factor() > SAID).then(|| {
+            format!(
+                "{:.1} % of the signal, smooth over the lines and new in each FRF: the FRFs of one posture have nothing of it in common, \
+                 as errors of the measurement leave it (windows, leakage, few averages), and nothing in the structure, a channel or a hammer",
+                100.0 * self.share_of_signal(largest.excess),
+            )
+        })
     }
 
     /// Whether small errors of the setup explain nearly all of what tests of structure find.

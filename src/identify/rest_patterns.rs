@@ -94,6 +94,7 @@ pub fn test_beyond(curves: &mut [RestCurve], after: AfterSlips) -> BeyondSlips {
         unlikely: after.unlikely,
         evidence: after.evidence,
         known_to: after.known_to,
+        own_errors: None,
     }
 }
 

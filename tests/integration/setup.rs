@@ -132,3 +132,64 @@ fn a_wrong_milling_direction_is_told_with_the_right_angles() {
         );
     }
 }
+
+/// One cut whose feed and one whose depth the list has wrong: `cfc` names cut and factor first, and there is no missing physics.
+#[test]
+fn a_cut_made_otherwise_than_the_list_says_is_told_with_what_it_was_made_with() {
+    for (key, stated, kind, factor) in [
+        ("feed_per_tooth_mm", "0.15", "feed-override", 0.1 / 0.15),
+        ("axial_depth_mm", "1.6", "axial-depth", 2.0 / 1.6),
+    ] {
+        let copy = copy_of("force-9400");
+        let file = copy.path().join("campaign.toml");
+        let text = std::fs::read_to_string(&file).unwrap();
+        let cut = text.find("id = \"08\"").unwrap();
+        let line = cut + text[cut..].find(key).unwrap();
+        let end = line + text[line..].find('\n').unwrap();
+        std::fs::write(
+            &file,
+            format!("{}{key} = {stated}{}", &text[..line], &text[end..]),
+        )
+        .unwrap();
+        let dir = copy.path().to_str().unwrap();
+        for command in ["cfc", "diagnose"] {
+            let said = document(&[command, dir]);
+            let found = finding(&said).unwrap_or_else(|| panic!("{command}: {said}"));
+            assert_eq!(found["kind"], kind, "{found}");
+            assert_eq!(found["where"], "cut 08", "{found}");
+            let [value, std] = ["value", "std_error"].map(|key| found[key].as_f64().unwrap());
+            assert!(
+                (value - factor).abs() < 4.0 * std && std < 0.01 * factor,
+                "{found}"
+            );
+        }
+    }
+}
+
+/// A smooth error of 1 % that is new in each FRF is nothing that the model lacks.
+#[test]
+fn errors_that_each_frf_has_of_its_own_are_no_missing_physics() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let dir = dir.to_str().unwrap();
+    document(&[
+        "simulate",
+        "--out",
+        dir,
+        "--seed",
+        "774",
+        "--kind",
+        "careful",
+        "--laboratory",
+        "coloured",
+    ]);
+    let said = document(&["diagnose", dir]);
+    assert_eq!(said["verdict"], "none", "{}", said["baseline"]);
+    let own = &said["rest"]["beyond_small_errors"]["own_errors"];
+    assert!(
+        own["common"].as_f64().unwrap() < 0.4 && own["of_a_place"].as_f64().unwrap() < 0.03,
+        "{own}"
+    );
+    let text = lobestone(&["diagnose", dir]).stdout;
+    assert!(text.contains("new in each"), "{text}");
+}

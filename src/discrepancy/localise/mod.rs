@@ -162,6 +162,9 @@ impl Localisation {
     }
 }
 
+/// Share of what stands above the noise that a place explains at least: where much is left that is no noise, every place takes some of it,
+/// by more than noise could.
+const LEAST_SHARE: f64 = 0.1;
 /// Places that are refitted with a form, …
 const FITTED: usize = 10;
 /// … and such as promise most at each other starting point.
@@ -403,7 +406,9 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             (Some(with), Some(without)) => with.chi2 < without.chi2,
             _ => true,
         };
-        predicts && !best.at_bound && is_convincing(best.p_value, best.delta_bic)
+        let above = baseline.reduced_chi2 - 1.0;
+        let explains = baseline.reduced_chi2 - settled[0].left > LEAST_SHARE * above;
+        predicts && explains && !best.at_bound && is_convincing(best.p_value, best.delta_bic)
     });
     Ok(Localisation {
         places,

@@ -10,6 +10,7 @@ use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::frfs::place_test;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Stopping;
+use crate::identify::own_errors::{self, OwnErrors};
 use crate::identify::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use crate::identify::rest_patterns;
 use crate::identify::study::{Extent, HeldOut, Measure, Residual, Study, View, held_out};
@@ -238,11 +239,35 @@ impl Study for StructureStudy {
             test.excess += price;
             beyond.tests.push(test);
         }
+        beyond.own_errors = self.own_errors(model, theta, &curves, &beyond)?;
         Ok(Some(beyond))
     }
 
     fn calibrate(&self, model: &StructureModel) -> Result<Calibration> {
         calibrate(model, &self.data, self.measured(), self.options)
+    }
+}
+
+impl StructureStudy {
+    /// What `curves`, left after small errors of the setup, say of errors that each has of its own.
+    fn own_errors(
+        &self,
+        model: &StructureModel,
+        theta: &[f64],
+        curves: &[RestCurve],
+        beyond: &BeyondSlips,
+    ) -> Result<Option<OwnErrors>> {
+        let Some(largest) = rest::largest(&beyond.tests) else {
+            return Ok(None);
+        };
+        // What curves have in common is none of their own: the other test, an expensive one, need not be made.
+        let Some(common) =
+            own_errors::common(curves).filter(|[found, std]| *found < own_errors::TOO_MUCH + 3.0 * std)
+        else {
+            return Ok(None);
+        };
+        let place = place_test::test(model, theta, &self.data, curves)?;
+        Ok(place.and_then(|place| own_errors::own_errors(common, &place, largest.excess)))
     }
 }
 

@@ -36,8 +36,9 @@ impl Effect<Structure> for Counterbalance {
         Background {
             lab_check: "Look for a cylinder between the turret and the lower arm. Read its pressure (a gas one that has lost some is \
                         common), and measure the same tool point with joint 2 leaning forward, upright and back.",
-            typical: "Peak torques of 2 to 20 kN·m, which is as many kN·m/rad of stiffness; oil cylinders whose valves are shut many \
-                      times that. Robots for 100 kg and more mostly have one.",
+            typical: "Peak torques of 2 to 20 kN·m, which is as many kN·m/rad: a hundredth of the gear's stiffness at most, which hardly \
+                      shows. Stiff springs, and oil cylinders whose valves are shut, 100 kN·m/rad and more. Robots for 100 kg and more \
+                      mostly have one.",
             best_measured: "Postures in which joint 2 goes through most of its range and joint 3 makes up for it, so that gravity's \
                             torque stays alike.",
             sources: &[
@@ -65,10 +66,6 @@ impl Effect<Structure> for Counterbalance {
     fn obstacle(&self, Known { data, .. }: &Known<Structure>) -> Option<String> {
         (data.postures < 3)
             .then(|| "a stiffness that follows the arm's angle takes three postures or more".to_string())
-    }
-
-    fn on_promise(&self) -> bool {
-        true
     }
 
     fn parameters(&self, At { variant, .. }: At, _known: &Known<Structure>) -> Vec<Parameter> {
@@ -110,7 +107,7 @@ impl Effect<Structure> for Counterbalance {
             &[
                 UsualSize::new(
                     "stiffness_nm_per_rad",
-                    SizeRange::Log(2e4, 2e5),
+                    SizeRange::Log(1e5, 5e5),
                     FollowsSize::Power(1.0),
                 ),
                 UsualSize::new("stiffest_at_deg", SizeRange::Either(60.0), FollowsSize::Not),

@@ -62,6 +62,22 @@ pub fn driven_too_far<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFi
     too_far && c.refined && is_convincing(c.p_value, c.delta_bic) && improves_prediction(c, baseline, chance)
 }
 
+/// Whether `simpler` is the special case of `general` and leaves hardly more: what both leave is something else, which the general one
+/// may follow a little.
+pub fn says_as_much<D: Modelled>(simpler: &EffectCandidate<D>, general: &EffectCandidate<D>) -> bool {
+    general.instance.effect.refines() == Some(simpler.instance.effect.id())
+        && simpler.refined
+        && general.refined
+        && leaves_hardly_more(simpler.reduced_chi2, general.reduced_chi2)
+}
+
+/// Misfits per degree of freedom of the special and the general case.
+fn leaves_hardly_more(simpler: f64, general: f64) -> bool {
+    /// As a share of what the general one leaves above noise.
+    const HARDLY: f64 = 0.1;
+    simpler - general < HARDLY * (general - 1.0).max(0.0)
+}
+
 fn improves_prediction<D: Modelled>(c: &EffectCandidate<D>, baseline: &BaselineFit, chance: f64) -> bool {
     match (&c.held_out, &baseline.held_out) {
         (Some(with), Some(without)) => is_progress(without, with, c.parameters.len(), chance),
@@ -386,6 +402,15 @@ mod tests {
                 own_errors: None,
             }),
         }
+    }
+
+    #[test]
+    fn a_general_law_leads_only_where_its_special_case_leaves_clearly_more() {
+        // Both leave half of the noise's variance above it, of which the general law follows a fiftieth.
+        assert!(leaves_hardly_more(1.51, 1.50));
+        assert!(!leaves_hardly_more(1.60, 1.50));
+        // Where the general one leaves noise, that decides.
+        assert!(!leaves_hardly_more(1.02, 1.0) && !leaves_hardly_more(1.001, 0.99));
     }
 
     /// One parameter gains 10.8 by chance.

@@ -107,6 +107,11 @@ pub trait Effect<D: Domain>: Sync {
         0
     }
 
+    /// Id of the simpler effect that this one is the general case of: this leads only where that leaves clearly more.
+    fn refines(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Effects with lower order are applied first (a payload weighs on the joints before their load is counted).
     fn order(&self) -> u8 {
         1

@@ -239,9 +239,10 @@ mod tests {
     fn errors_of_each_curve_have_nothing_in_common_and_others_have() {
         for seed in 1..6 {
             let [own, std] = common(&curves(true, seed)).unwrap();
-            assert!(own.abs() < 4.0 * std.hypot(UNSURE), "{seed}: {own} {std}");
+            assert!(own.abs() < 2.0 * std.hypot(UNSURE), "{seed}: {own} {std}");
+            // Over a block errors as smooth as these have half of their course in common by chance: all of it is twice that at most.
             let [shared, std] = common(&curves(false, seed)).unwrap();
-            assert!(shared > 10.0 * std && shared > 0.3, "{seed}: {shared} {std}");
+            assert!(shared > 2.5 * std && shared > 0.3, "{seed}: {shared} {std}");
         }
     }
 

@@ -143,7 +143,7 @@ fn a_cut_made_otherwise_than_the_list_says_is_told_with_what_it_was_made_with() 
         let copy = copy_of("force-9400");
         let file = copy.path().join("campaign.toml");
         let text = std::fs::read_to_string(&file).unwrap();
-        let cut = text.find("id = \"08\"").unwrap();
+        let cut = text.find("id = \"05\"").unwrap();
         let line = cut + text[cut..].find(key).unwrap();
         let end = line + text[line..].find('\n').unwrap();
         std::fs::write(
@@ -156,7 +156,7 @@ fn a_cut_made_otherwise_than_the_list_says_is_told_with_what_it_was_made_with() 
             let said = document(&[command, dir]);
             let found = finding(&said).unwrap_or_else(|| panic!("{command}: {said}"));
             assert_eq!(found["kind"], kind, "{found}");
-            assert_eq!(found["where"], "cut 08", "{found}");
+            assert_eq!(found["where"], "cut 05", "{found}");
             let [value, std] = ["value", "std_error"].map(|key| found[key].as_f64().unwrap());
             assert!(
                 (value - factor).abs() < 4.0 * std && std < 0.01 * factor,

@@ -1,13 +1,14 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::data::RobotSpec;
+use crate::effects::structural::payload::Payload;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Background, Effect, Known, NEGLIGIBLE, Site, Size};
 use crate::parameter::{Parameter, Prior};
 use crate::robot::{Body, Chain, Dual, Place, Slot};
 
-/// A load on the flange with a centre of mass and an inertia of its own: a [`Payload`](super::payload::Payload) is a point.
+/// A load on the flange with a centre of mass and an inertia of its own: a [`Payload`] is a point.
 pub struct PayloadInertia;
 
 impl Effect<Structure> for PayloadInertia {
@@ -119,6 +120,10 @@ impl Effect<Structure> for PayloadInertia {
         Some(values)
     }
 
+    fn refines(&self) -> Option<&'static str> {
+        Some(Payload.id())
+    }
+
     fn order(&self) -> u8 {
         0
     }
@@ -180,7 +185,6 @@ fn shares([x, y, z]: [&Dual; 3]) -> Vec<(Vector3<f64>, Dual)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::structural::payload::Payload;
     use crate::robot::fixture::{TAP_POSTURES, irb6640};
     use crate::robot::{Baseline, RobotModel};
 

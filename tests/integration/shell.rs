@@ -6,7 +6,7 @@ use crate::support::{document, lobestone, program};
 fn every_effect_is_listed_and_explained() {
     let list = document(&["explain"]);
     let effects = list["effects"].as_array().unwrap();
-    assert_eq!(effects.len(), 17 + 15);
+    assert_eq!(effects.len(), 19 + 15);
     let text = lobestone(&["explain"]).stdout;
     for effect in effects {
         let id = effect["effect"].as_str().unwrap();

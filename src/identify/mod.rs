@@ -1,6 +1,7 @@
 //! Fits models to measurements: parameters with priors, the least-squares solver, uncertainty.
 
 pub mod case;
+pub mod common_course;
 pub mod departures;
 pub mod first_size;
 pub mod forces;

@@ -4,13 +4,14 @@ use num_complex::Complex64;
 
 use crate::Result;
 use crate::effects::{DataSummary, Known, Registry, Structure};
+use crate::identify::common_course;
 use crate::identify::frfs::calibrate::{Calibration, GLANCE_VALUES, Options, calibrate, sketch};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::frfs::place_test;
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Stopping;
-use crate::identify::own_errors::{self, OwnErrors};
+use crate::identify::own_errors::OwnErrors;
 use crate::identify::rest::{self, AfterSlips, BeyondSlips, Rest, RestCurve, SMALL_ERROR};
 use crate::identify::rest_patterns;
 use crate::identify::study::{Extent, HeldOut, Measure, Residual, Study, View, held_out};
@@ -262,12 +263,17 @@ impl StructureStudy {
         };
         // What curves have in common is none of their own: the other test, an expensive one, need not be made.
         let Some(common) =
-            own_errors::common(curves).filter(|[found, std]| *found < own_errors::TOO_MUCH + 3.0 * std)
+            common_course::common(curves).filter(|[found, std]| *found < common_course::TOO_MUCH + 3.0 * std)
         else {
             return Ok(None);
         };
         let place = place_test::test(model, theta, &self.data, curves)?;
-        Ok(place.and_then(|place| own_errors::own_errors(common, &place, largest.excess)))
+        Ok(place.map(|place| OwnErrors {
+            common: common[0],
+            common_std: common[1],
+            of_a_place: place.excess / largest.excess,
+            of_a_place_std: place.std / largest.excess,
+        }))
     }
 }
 

@@ -554,21 +554,21 @@ impl LabDeparture for FloorMode {
 }
 
 /// A spring about joint 2 (of a counterbalance cylinder) whose stiffness follows the cylinder's lever arm.
-pub struct Counterbalance {
+pub struct CounterbalanceCylinder {
     share: f64,
     phase_rad: f64,
 }
 
-impl Counterbalance {
+impl CounterbalanceCylinder {
     pub fn draw(_robot: &RobotSpec, draws: &mut Draws) -> Box<dyn LabDeparture> {
-        Box::new(Counterbalance {
+        Box::new(CounterbalanceCylinder {
             share: draws.uniform(0.2, 0.5),
             phase_rad: draws.uniform(0.0, TAU),
         })
     }
 }
 
-impl LabDeparture for Counterbalance {
+impl LabDeparture for CounterbalanceCylinder {
     fn id(&self) -> &'static str {
         "counterbalance"
     }

@@ -38,7 +38,7 @@ const KINDS: [(&str, Draw); 18] = [
     ("bearing-radial", mechanics::RadialBearing::draw),
     ("drift-with-order", mechanics::Drift::draw),
     ("floor-mode", mechanics::FloorMode::draw),
-    ("counterbalance", mechanics::Counterbalance::draw),
+    ("counterbalance", mechanics::CounterbalanceCylinder::draw),
 ];
 
 /// Ids of all kinds.

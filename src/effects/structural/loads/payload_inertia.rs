@@ -1,7 +1,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::data::RobotSpec;
-use crate::effects::structural::payload::Payload;
+use crate::effects::structural::loads::payload::Payload;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Background, Effect, Known, NEGLIGIBLE, Site, Size};

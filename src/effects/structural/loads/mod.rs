@@ -1,0 +1,4 @@
+//! Loads on the flange.
+
+pub(crate) mod payload;
+pub(crate) mod payload_inertia;

@@ -1,4 +1,4 @@
-//! Order statistics.
+//! Order statistics, and the normal law.
 
 /// The value that the share `share` (0..1) of `values` lies below, interpolated linearly between order statistics (Hyndman and
 /// Fan 1996, type 7). What is not a number is left out; what is unlimited counts as infinite. `None` where nothing is left, or
@@ -39,6 +39,11 @@ fn between(low: f64, high: f64, part: f64) -> Option<f64> {
         low + (high - low) * part
     };
     value.is_finite().then_some(value)
+}
+
+/// ln of the density of a normal law of this standard deviation, `difference` from its mean.
+pub fn ln_normal(difference: f64, std: f64) -> f64 {
+    -0.5 * ((difference / std).powi(2) + (std::f64::consts::TAU * std * std).ln())
 }
 
 /// For tests: a number that is near enough to standard normal, the sum of twelve uniform ones less six.

@@ -347,12 +347,14 @@ impl<'a, S: Study> Engine<'a, S> {
             })
             .collect::<Result<_>>()?;
         candidates.sort_by(|a, b| a.delta_bic.total_cmp(&b.delta_bic));
-        let superseded: Vec<String> = candidates
+        let superseded =
+            |c: &CandidateOf<S>| candidates.iter().any(|simpler| verdict::says_as_much(simpler, c));
+        let mut kept = candidates
             .iter()
-            .filter(|c| candidates.iter().any(|simpler| verdict::says_as_much(simpler, c)))
-            .map(EffectCandidate::label)
-            .collect();
-        candidates.retain(|c| !superseded.contains(&c.label()));
+            .map(|c| !superseded(c))
+            .collect::<Vec<_>>()
+            .into_iter();
+        candidates.retain(|_| kept.next() == Some(true));
         let mut baseline = BaselineFit {
             held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             residual: base_residual,

@@ -10,6 +10,7 @@ use std::f64::consts::TAU;
 use super::setup::CARE;
 use crate::identify::own_errors::OwnErrors;
 use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
+use crate::statistics::ln_normal;
 
 /// Probability that the errors of the setup are large enough to be seen.
 const VISIBLE_ERRORS: f64 = 0.1;
@@ -96,7 +97,7 @@ fn of_usual_errors(largest: &RestTest, rest: &Rest) -> Option<f64> {
     let found = -0.5 * (TAU * CARE * CARE).ln() - beyond.unlikely - largest.excess.ln();
     let excess = after.excess.max(0.0);
     let mut left = vec![
-        ALL_FITTED.ln() + log_normal(excess, after.std),
+        ALL_FITTED.ln() + ln_normal(excess, after.std),
         (1.0 - ALL_FITTED).ln() + log_density(excess, after.std, rest.small_errors, exponential),
     ];
     let own = beyond.own_errors;
@@ -115,7 +116,7 @@ fn of_own_errors(excess: f64, own: &OwnErrors, rest: &Rest) -> f64 {
     let excess = excess.max(f64::MIN_POSITIVE);
     // Energy goes with the square of the size.
     let size = 0.5 * (excess / rest.small_errors.max(f64::MIN_POSITIVE)).ln();
-    OWN_ERRORS.ln() + own.log_factor() + log_normal(size, CARE) - (2.0 * excess).ln()
+    OWN_ERRORS.ln() + own.log_factor() + ln_normal(size, CARE) - (2.0 * excess).ln()
 }
 
 /// Odds that something the library does not have is behind what a model leaves, against the small errors of the setup.
@@ -170,7 +171,7 @@ pub fn odds_of_something_faint(of_tests: f64, of_candidates: f64, values: f64) -
 fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f64) -> f64 {
     // Less than noise is no better than noise.
     let excess = test.excess.max(0.0);
-    let noise = log_normal(excess, test.std);
+    let noise = ln_normal(excess, test.std);
     let there = [
         (1.0 - VISIBLE_ERRORS - NEARLY_RIGHT).ln() + noise,
         VISIBLE_ERRORS.ln() + log_density(excess, test.std, small_errors, |u| (-u).exp()),
@@ -194,10 +195,6 @@ fn part_of_a_rest(u: f64) -> f64 {
     (1.0 / u).ln_1p() - 1.0 / (1.0 + u)
 }
 
-fn log_normal(difference: f64, std: f64) -> f64 {
-    -0.5 * ((difference / std).powi(2) + (TAU * std * std).ln())
-}
-
 /// ln of the density of finding `excess` ± `std` where the true excess over `scale` has the density `of`.
 fn log_density(excess: f64, std: f64, scale: f64, of: fn(f64) -> f64) -> f64 {
     /// Standard deviations from which on the scatter is too narrow to matter.
@@ -211,7 +208,7 @@ fn log_density(excess: f64, std: f64, scale: f64, of: fn(f64) -> f64) -> f64 {
     let step = (high / low).ln() / STEPS as f64;
     let terms: Vec<f64> = (0..=STEPS)
         .map(|i| low * (i as f64 * step).exp())
-        .map(|e| log_normal(excess - e, std) + (of(e / scale) * e / scale * step).ln())
+        .map(|e| ln_normal(excess - e, std) + (of(e / scale) * e / scale * step).ln())
         .collect();
     log_sum(&terms)
 }

@@ -25,6 +25,8 @@ pub(super) const MOBERG: &str = "Moberg, S.; Wernholt, E.; Hanssen, S.; Brogård
                           Measurement, and Control 136(3).";
 pub(super) const TUTTLE: &str = "Tuttle, T. D.; Seering, W. P. (1996): A nonlinear model of a harmonic drive gear transmission. \
                           IEEE Transactions on Robotics and Automation 12(3).";
+pub(super) const KHALIL: &str = "Khalil, W.; Gautier, M.; Lemoine, P. (2007): Identification of the payload inertial parameters of \
+                          industrial manipulators. IEEE International Conference on Robotics and Automation.";
 pub(super) const BUDAK: &str = "Budak, E.; Altintas, Y.; Armarego, E. J. A. (1996): Prediction of milling force coefficients from \
                          orthogonal cutting data. ASME Journal of Manufacturing Science and Engineering 118(2).";
 pub(super) const SHAW_OXFORD: &str = "Shaw, M. C.; Oxford, C. J. (1957): On the drilling of metals, 2: the torque and thrust in \

@@ -1,5 +1,9 @@
 //! Errors that each measured curve has of its own, against something that several curves have in common: the evidence.
 
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::statistics::ln_normal;
+
 /// What two curves may have in common although their errors are their own, over what chance puts there.
 pub(super) const UNSURE: f64 = 0.1;
 /// What something else gives curves in common over chance, at most.
@@ -27,21 +31,16 @@ pub struct OwnErrors {
 impl OwnErrors {
     /// ln of the Bayes factor of "each curve has errors of its own" against "something that several curves have in common".
     pub fn log_factor(&self) -> f64 {
-        let common = normal(self.common, 0.0, self.common_std.hypot(UNSURE))
+        let common = ln_normal(self.common, self.common_std.hypot(UNSURE))
             - density_of_common(self.common, self.common_std).ln();
         let std = self.of_a_place_std.hypot(OF_A_PLACE);
         let share = self.of_a_place.max(0.0);
         let [least, most] = PLACE_TAKES;
         let place = (1.0 - BESIDES_PLACES) * at_least(share, least, std)
             / ((most / least).ln() * share.max(least))
-            + BESIDES_PLACES * normal(share, OF_A_PLACE, std).exp().min(1.0 / least);
-        common + normal(share, OF_A_PLACE, std) - place.ln()
+            + BESIDES_PLACES * ln_normal(share - OF_A_PLACE, std).exp().min(1.0 / least);
+        common + ln_normal(share - OF_A_PLACE, std) - place.ln()
     }
-}
-
-/// ln of a normal density.
-fn normal(value: f64, mean: f64, std: f64) -> f64 {
-    -0.5 * (((value - mean) / std).powi(2) + (std::f64::consts::TAU * std * std).ln())
 }
 
 /// Density of what is found in common, where it is anything from nothing to all.
@@ -51,8 +50,7 @@ fn density_of_common(value: f64, std: f64) -> f64 {
 
 /// Probability that a value found as `value` ± `std` is `least` or more.
 fn at_least(value: f64, least: f64, std: f64) -> f64 {
-    use statrs::distribution::{ContinuousCDF, Normal};
-    Normal::new(0.0, 1.0).map_or(1.0, |n| n.cdf((value - least) / std))
+    Normal::standard().cdf((value - least) / std)
 }
 
 #[cfg(test)]

@@ -406,16 +406,16 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
             (Some(with), Some(without)) => with.chi2 < without.chi2,
             _ => true,
         };
-        let above = baseline.reduced_chi2 - 1.0;
-        let explains = baseline.reduced_chi2 - settled[0].left > LEAST_SHARE * above;
-        predicts && explains && !best.at_bound && is_convincing(best.p_value, best.delta_bic)
+        predicts && !best.at_bound && is_convincing(best.p_value, best.delta_bic)
     });
-    Ok(Localisation {
+    let mut found = Localisation {
         places,
         significant,
         baseline,
         baseline_held_out,
-    })
+    };
+    found.significant &= found.explained_share().is_none_or(|share| share > LEAST_SHARE);
+    Ok(found)
 }
 
 /// Every one of `spots` without a law, at a point of the model (solver's scale).

@@ -17,6 +17,7 @@ const LAWS: [&str; 2] = ["force", "stiffness"];
 
 /// The joint it is built at.
 const JOINT: usize = 2;
+const NOMINAL_NM_PER_RAD: f64 = 5e4;
 
 impl Effect<Structure> for Counterbalance {
     fn id(&self) -> &'static str {
@@ -69,27 +70,29 @@ impl Effect<Structure> for Counterbalance {
     }
 
     fn parameters(&self, At { variant, .. }: At, _known: &Known<Structure>) -> Vec<Parameter> {
-        // cos² repeats after half a turn.
-        let turn = if variant == 0 { 360.0 } else { 180.0 };
+        let turn = repeats_after_deg(variant);
         let prior = Prior {
             mean: 0.0,
             std: turn / 2.0,
         };
         vec![
-            Parameter::logarithmic("stiffness_nm_per_rad", "N·m/rad", 5e4, 1.5, [1e2, 1e8]),
+            Parameter::logarithmic(
+                "stiffness_nm_per_rad",
+                "N·m/rad",
+                NOMINAL_NM_PER_RAD,
+                1.5,
+                [1e2, 1e8],
+            ),
             // Wide enough that no start comes to an end: every turn is the same law again.
             Parameter::linear("stiffest_at_deg", "°", 0.0, prior, [-3.0 * turn, 3.0 * turn]),
         ]
     }
 
-    fn starts(&self, At { variant, .. }: At, known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
-        let at = At {
-            site: Site::Joint(JOINT),
-            variant,
-        };
-        let size = self.parameters(at, known)[0].nominal;
-        let turn = if variant == 0 { 360.0 } else { 180.0 };
-        [1.0, -1.0].map(|side| vec![size, side * turn / 3.0]).to_vec()
+    fn starts(&self, At { variant, .. }: At, _known: &Known<Structure>, _peaks_hz: &[f64]) -> Vec<Vec<f64>> {
+        let third = repeats_after_deg(variant) / 3.0;
+        [third, -third]
+            .map(|angle| vec![NOMINAL_NM_PER_RAD, angle])
+            .to_vec()
     }
 
     fn impossible(&self, _site: Site, robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
@@ -138,6 +141,11 @@ impl Effect<Structure> for Counterbalance {
             element.stiffness = &element.stiffness + &own;
         }
     }
+}
+
+/// Angle after which a law is the same again: cos² after half a turn.
+fn repeats_after_deg(variant: usize) -> f64 {
+    if variant == 0 { 360.0 } else { 180.0 }
 }
 
 /// How far a link leans out of the vertical, turned about `axis` as the joint turns it, rad.

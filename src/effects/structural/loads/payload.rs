@@ -1,6 +1,7 @@
 use nalgebra::{Matrix3, Point3};
 
 use crate::data::RobotSpec;
+use crate::effects::background::KHALIL;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
@@ -36,8 +37,7 @@ impl Effect<Structure> for Payload {
              bent and straight: a mass at the flange and a softer wrist then differ. A weighed mass added on \
              purpose settles it.",
             sources: &[
-                "Khalil, W.; Gautier, M.; Lemoine, P. (2007): Identification of the payload inertial parameters of \
-                 industrial manipulators. IEEE International Conference on Robotics and Automation.",
+                KHALIL,
                 "Swevers, J.; Ganseman, C.; Tükel, D. B.; De Schutter, J.; Van Brussel, H. (1997): Optimal robot \
                  excitation and identification. IEEE Transactions on Robotics and Automation 13(5).",
             ],

@@ -1,6 +1,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::data::RobotSpec;
+use crate::effects::background::KHALIL;
 use crate::effects::structural::loads::payload::Payload;
 use crate::effects::structural::{PostureSetting, Structure};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
@@ -34,10 +35,7 @@ impl Effect<Structure> for PayloadInertia {
                       mounted sideways; radius of gyration 0.05 to 0.3 m.",
             best_measured: "FRFs at the flange and the tool point in all three directions, at postures with the wrist bent two ways, \
                             so that the load turns about each of its axes.",
-            sources: &[
-                "Khalil, W.; Gautier, M.; Lemoine, P. (2007): Identification of the payload inertial parameters of industrial \
-                 manipulators. IEEE International Conference on Robotics and Automation.",
-            ],
+            sources: &[KHALIL],
         }
     }
 
@@ -66,17 +64,11 @@ impl Effect<Structure> for PayloadInertia {
         ]
     }
 
-    fn impossible(&self, _site: Site, robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
-        let moving: f64 = robot.links.iter().map(|l| l.mass_kg).sum();
-        let [mass, _, _, _, gyration] = sizes else {
+    fn impossible(&self, site: Site, robot: &RobotSpec, sizes: &[Size]) -> Option<String> {
+        let [_, _, _, _, gyration] = sizes else {
             return None;
         };
-        let mass = mass.outside(
-            "a mass",
-            [1e-4 * moving, 0.5 * moving],
-            (1.0, "kg"),
-            "less than a ten-thousandth of the arm is a cable tie, more than half of it the robot could not carry",
-        );
+        let mass = Payload.impossible(site, robot, sizes);
         let offset = || {
             sizes[1..4].iter().find_map(|com| {
                 com.outside(

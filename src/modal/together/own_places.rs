@@ -108,17 +108,31 @@ pub(super) struct MissedMode {
     pub height: f64,
 }
 
-/// Peaks that most of the FRFs know well by themselves, that are among the highest of each (as mobility), and that no common mode
-/// accounts for, ascending in frequency.
-pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<MissedMode> {
-    struct Place<'a> {
-        frequency_hz: f64,
-        /// Half-width, or a line where that is more, Hz.
-        width_hz: f64,
-        own: Vec<(usize, &'a FrfMode)>,
-        height: f64,
+/// A peak that an FRF has by itself.
+#[derive(Clone, Copy)]
+struct Peak<'a> {
+    /// Number of its FRF.
+    member: usize,
+    mode: &'a FrfMode,
+    /// Its height over that of the highest of its FRF (as mobility).
+    height: f64,
+}
+
+impl Peak<'_> {
+    fn frequency_hz(&self) -> f64 {
+        self.mode.best().frequency_hz
     }
-    let mut places: Vec<Place> = Vec::new();
+
+    /// Half-width, or a line where that is more, Hz.
+    fn width_hz(&self) -> f64 {
+        let best = self.mode.best();
+        width_or_line_hz(self.mode, best.damping_ratio * best.frequency_hz)
+    }
+}
+
+/// Peaks that are known well and among the highest of their FRFs, ascending in frequency.
+fn clear_peaks<'a>(members: &[&'a SetMember]) -> Vec<Peak<'a>> {
+    let mut peaks = Vec::new();
     for (m, member) in members.iter().enumerate() {
         let known = |mode: &&FrfMode| {
             let own = mode.best();
@@ -134,74 +148,97 @@ pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<Missed
                 .map_or(0.0, |c| c.norm() / (own.damping_ratio * own.frequency_hz))
         };
         let highest = member.modes.modes.iter().map(height).fold(0.0, f64::max);
-        let high = |mode: &&FrfMode| height(mode) >= HIGH * highest;
-        for mode in member.modes.modes.iter().filter(known).filter(high) {
-            let own = mode.best();
-            let half_width_hz = own.damping_ratio * own.frequency_hz;
-            let width_hz = width_or_line_hz(mode, half_width_hz);
-            let height = height(mode) / highest;
-            let same = |p: &&mut Place| (p.frequency_hz - own.frequency_hz).abs() < p.width_hz + width_hz;
-            match places.iter_mut().find(same) {
-                Some(place) => {
-                    place.own.push((m, mode));
-                    place.height = place.height.max(height);
-                }
-                None => places.push(Place {
-                    frequency_hz: own.frequency_hz,
-                    width_hz,
-                    own: vec![(m, mode)],
-                    height,
-                }),
-            }
+        let clear = member.modes.modes.iter().filter(known).map(|mode| Peak {
+            member: m,
+            mode,
+            height: height(mode) / highest,
+        });
+        peaks.extend(clear.filter(|peak| peak.height >= HIGH));
+    }
+    peaks.sort_by(|a: &Peak, b: &Peak| a.frequency_hz().total_cmp(&b.frequency_hz()));
+    peaks
+}
+
+/// Peaks (ascending) by place. A mode that moves from FRF to FRF by more than its width has one peak in each, each near the next; where
+/// an FRF has several of such a row they are several modes, and a place reaches as far as the widths.
+fn places<'a>(peaks: &[Peak<'a>]) -> Vec<Vec<Peak<'a>>> {
+    let near = |a: &Peak, b: &Peak| (a.frequency_hz() - b.frequency_hz()).abs() < a.width_hz() + b.width_hz();
+    let mut places = Vec::new();
+    for row in peaks.chunk_by(near) {
+        let mut frfs: Vec<usize> = row.iter().map(|p| p.member).collect();
+        frfs.sort_unstable();
+        frfs.dedup();
+        if frfs.len() == row.len() {
+            places.push(row.to_vec());
+            continue;
+        }
+        let mut left = row.to_vec();
+        left.sort_by_key(|p| p.member);
+        while let Some(&first) = left.first() {
+            let (here, elsewhere) = left.into_iter().partition(|p| near(&first, p));
+            let mut here: Vec<Peak> = here;
+            here.dedup_by_key(|p| p.member);
+            places.push(here);
+            left = elsewhere;
         }
     }
-    places.retain(|place| {
+    places
+}
+
+/// Peaks that most of the FRFs know well by themselves, that are among the highest of each (as mobility), and that no common mode
+/// accounts for, ascending in frequency.
+pub(super) fn missed(members: &[&SetMember], found: &[GlobalMode]) -> Vec<MissedMode> {
+    let is_missed = |place: &Vec<Peak>| {
+        let at: Vec<f64> = place.iter().map(|p| p.frequency_hz()).collect();
+        let from_hz = at.iter().copied().fold(f64::INFINITY, f64::min);
+        let to_hz = at.iter().copied().fold(0.0, f64::max);
+        let width_hz = place.iter().map(|p| p.width_hz()).fold(0.0, f64::max);
         let reaching = members
             .iter()
-            .filter(|m| reach(m.frequency_hz, place.frequency_hz));
+            .filter(|m| reach(m.frequency_hz, 0.5 * (from_hz + to_hz)));
         let accounts = |mode: &GlobalMode| {
-            let width_hz = mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
-            (mode.frequency_hz - place.frequency_hz).abs() < place.width_hz + width_hz
+            let near_hz = width_hz + mode.damping_ratio * mode.frequency_hz + mode.frequency_std_hz;
+            (from_hz - near_hz..to_hz + near_hz).contains(&mode.frequency_hz)
         };
-        2 * place.own.len() > reaching.count() && !found.iter().any(accounts)
-    });
-    places.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-    places
-        .iter_mut()
-        .for_each(|place| place.own.dedup_by_key(|(m, _)| *m));
-    places
-        .iter()
-        .map(|place| {
-            let own: Vec<(Pole, [f64; 2])> =
-                place.own.iter().filter_map(|(_, mode)| with_std(mode)).collect();
-            let (pole, std) = match own.as_slice() {
-                [one] => *one,
-                several => mean_pole(several),
-            };
-            MissedMode {
-                own: OwnPlace { pole, std },
-                lines_in_half_power_band: place
-                    .own
-                    .iter()
-                    .map(|(_, mode)| mode.lines_in_half_power_band)
-                    .fold(f64::INFINITY, f64::min),
-                constants: place
-                    .own
-                    .iter()
-                    .filter_map(|(m, mode)| {
-                        let best = mode.best();
-                        let constant = best.modal_constant?;
-                        Some((
-                            *m,
-                            constant,
-                            constant.norm() * best.damping_std? / best.damping_ratio,
-                        ))
-                    })
-                    .collect(),
-                height: place.height,
-            }
-        })
-        .collect()
+        2 * place.len() > reaching.count() && !found.iter().any(accounts)
+    };
+    let mut missed: Vec<MissedMode> = places(&clear_peaks(members))
+        .into_iter()
+        .filter(is_missed)
+        .map(|place| MissedMode::of(&place))
+        .collect();
+    missed.sort_by(|a, b| a.own.pole.frequency_hz.total_cmp(&b.own.pole.frequency_hz));
+    missed
+}
+
+impl MissedMode {
+    fn of(place: &[Peak]) -> MissedMode {
+        let own: Vec<(Pole, [f64; 2])> = place.iter().filter_map(|p| with_std(p.mode)).collect();
+        let (pole, std) = match own.as_slice() {
+            [one] => *one,
+            several => mean_pole(several),
+        };
+        let constant = |peak: &Peak| {
+            let best = peak.mode.best();
+            let constant = best.modal_constant?;
+            Some((
+                peak.member,
+                constant,
+                constant.norm() * best.damping_std? / best.damping_ratio,
+            ))
+        };
+        let mut constants: Vec<_> = place.iter().filter_map(constant).collect();
+        constants.sort_by_key(|(m, ..)| *m);
+        MissedMode {
+            own: OwnPlace { pole, std },
+            lines_in_half_power_band: place
+                .iter()
+                .map(|p| p.mode.lines_in_half_power_band)
+                .fold(f64::INFINITY, f64::min),
+            constants,
+            height: place.iter().map(|p| p.height).fold(0.0, f64::max),
+        }
+    }
 }
 
 /// The pole of a mode with the standard deviations of its frequency (Hz) and damping ratio.

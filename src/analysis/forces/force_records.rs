@@ -9,7 +9,7 @@ use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::cutting::{
     CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, analyse_in_step,
-    fit_force_coefficients, none_usable, repair_record,
+    contradicts_speed, fit_force_coefficients, none_usable, repair_record,
 };
 use crate::data::{Cut, Sample};
 use crate::identify::forces::cutting_data::CutData;
@@ -88,6 +88,43 @@ pub struct ForceRecords {
     pub averages: Vec<Result<CutAnalysis>>,
     /// Waveforms, or why there are none.
     pub waveforms: Vec<Result<Waveform>>,
+    /// Cuts whose files, of different names, hold the same record.
+    pub copies: Vec<Copied>,
+}
+
+/// The record of one cut that stands under another one's name as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Copied {
+    /// Both cuts, by index into `Campaign::cuts`, ascending.
+    pub cuts: [usize; 2],
+    /// The one that it is not of: it contradicts the speed stated for that, or counts already. `None` where that cannot be told.
+    pub not_of: Option<usize>,
+}
+
+/// Records that several files hold.
+fn copies(cuts: &[Cut], digests: &[Option<Digest>], waveforms: &[Result<Waveform>]) -> Vec<Copied> {
+    let is_at_odds = |i: usize| {
+        let notices = waveforms[i].as_ref().map_or(&[][..], |w| &w.1);
+        notices.iter().any(contradicts_speed)
+    };
+    let mut found: Vec<Copied> = Vec::new();
+    for b in 0..cuts.len() {
+        let same = |&a: &usize| {
+            digests[a].is_some()
+                && digests[a] == digests[b]
+                && cuts[a].file != cuts[b].file
+                && !found.iter().any(|f| f.not_of == Some(a))
+        };
+        let Some(a) = (0..b).find(same) else { continue };
+        let alike = cuts[a].geometry == cuts[b].geometry && cuts[a].spindle_rpm == cuts[b].spindle_rpm;
+        let not_of = match [is_at_odds(a), is_at_odds(b)] {
+            [true, false] => Some(a),
+            [false, true] => Some(b),
+            _ => alike.then_some(b),
+        };
+        found.push(Copied { cuts: [a, b], not_of });
+    }
+    found
 }
 
 impl ForceRecords {
@@ -125,7 +162,27 @@ impl ForceRecords {
             digests.push(digest);
         }
         campaign.records_were_read(&digests);
-        ForceRecords { averages, waveforms }
+        let copies = copies(&plain.cuts, &digests, &waveforms);
+        for Copied { cuts: both, not_of } in &copies {
+            for cut in both.iter().filter(|cut| not_of.is_none_or(|one| one == **cut)) {
+                let other = both[usize::from(both[0] == *cut)];
+                let error = Error::from(
+                    InputError::new(format!(
+                        "its file holds the same record as that of cut {}",
+                        plain.cuts[other].id
+                    ))
+                    .file(&plain.cuts[*cut].file)
+                    .remedy("export this cut's own record, or take the cut out of campaign.toml"),
+                );
+                averages[*cut] = Err(error.clone());
+                waveforms[*cut] = Err(error);
+            }
+        }
+        ForceRecords {
+            averages,
+            waveforms,
+            copies,
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::Result;
 use crate::cutting::cutting_trials::CuttingTrials;
 use crate::cutting::force_model::force_axis::{ForceAxis, axis_of};
 use crate::cutting::measured::cut_analysis::{CutAnalysis, Notice};
+use crate::cutting::measured::jump::put_jumps_right;
 use crate::cutting::measured::record::analyse_cut;
 use crate::data::{Process, Sample, TimeRecord, Tool};
 use crate::signal::{SpindleTrack, spindle_track};
@@ -33,6 +34,10 @@ pub fn analyse_in_step<S: Sample>(
 ) -> Result<RecordReading<S>> {
     let mut analysis = analyse_cut(trials, index, &record)?;
     let mut record = record;
+    if let Some(jumped) = put_jumps_right(&mut record, &analysis) {
+        notices.push(jumped);
+        analysis = analyse_cut(trials, index, &record)?;
+    }
     if let Some(found) = followed(trials.tool, &analysis, &record) {
         let file = &trials.cuts[index].file;
         notices.push(Notice {

@@ -6,6 +6,7 @@ pub(crate) mod contact;
 pub(crate) mod cut_analysis;
 pub(crate) mod faults;
 pub(crate) mod in_step;
+mod jump;
 pub(crate) mod leak;
 pub(crate) mod record;
 pub(crate) mod teeth;

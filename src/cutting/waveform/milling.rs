@@ -94,8 +94,15 @@ impl MillingCut {
 
     /// The same cut at `factor` times its depth.
     pub fn deeper(&self, factor: f64) -> MillingCut {
+        MillingCut {
+            axial_depth_mm: self.axial_depth_mm * factor,
+            ..self.steeper(factor)
+        }
+    }
+
+    /// The same cut with a helix of `factor` times the tangent (or a tool so many times thinner).
+    pub fn steeper(&self, factor: f64) -> MillingCut {
         let mut cut = self.clone();
-        cut.axial_depth_mm *= factor;
         cut.lag_rad *= factor;
         cut.places.iter_mut().for_each(|p| p.lag_rad *= factor);
         cut

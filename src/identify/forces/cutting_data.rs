@@ -95,6 +95,16 @@ impl CutData {
             .is_some_and(|[start, exit]| (start + exit - 180.0).abs() >= 20.0)
     }
 
+    /// Whether its record could be that of the other one: alike in speed, otherwise in feed, depth or width.
+    pub fn may_be_exchanged_with(&self, other: &CutData) -> bool {
+        let width = |cut: &CutData| match &cut.kind {
+            CutKind::Milling { cut, .. } => Some((cut.axial_depth_mm, cut.immersion)),
+            CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+        };
+        (self.spindle_rpm / other.spindle_rpm - 1.0).abs() < 1e-3
+            && (self.feed_mm != other.feed_mm || width(self) != width(other))
+    }
+
     /// One cut, the `index`-th of all, from its record and what was read off it.
     ///
     /// # Errors
@@ -348,6 +358,10 @@ pub struct CuttingData {
     /// Half of the records or more contradict their stated speed, or repeat nothing with it: what their waveforms say of channels,
     /// axes and physics is not to be believed.
     pub speed_is_contradicted: bool,
+    /// Ids of two cuts of which each ran at the speed stated for the other.
+    pub exchanged: Vec<[String; 2]>,
+    /// Ids of cuts whose files hold the same record, and of the one that it is not of, where that is known.
+    pub copies: Vec<([String; 2], Option<String>)>,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,
 }
@@ -407,6 +421,8 @@ impl CuttingData {
             dyno_from_tool: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
             summary,
             speed_is_contradicted: false,
+            exchanged: Vec::new(),
+            copies: Vec::new(),
             warnings: Vec::new(),
         })
     }
@@ -461,11 +477,69 @@ impl CuttingData {
     /// One cut milled `factor` times as deep as stated.
     #[must_use]
     pub fn with_depth_of(&self, cut: usize, factor: f64) -> Self {
+        self.milled_otherwise(|i| i == cut, |milling| Some(milling.deeper(factor)))
+    }
+
+    /// The cuts for which `wider` holds (by index into [`CuttingData::cuts`]) milled `factor` times as wide as stated, where the work
+    /// reaches to one edge of the cutter.
+    #[must_use]
+    pub fn with_width_of(&self, wider: impl Fn(usize) -> bool, factor: f64) -> Self {
+        self.milled_otherwise(wider, |milling| {
+            Some(MillingCut {
+                immersion: milling.immersion.wider(factor)?,
+                ..milling.clone()
+            })
+        })
+    }
+
+    /// All cuts milled with a helix of `factor` times the tangent stated for the tool (or with a tool so many times thinner).
+    #[must_use]
+    pub fn with_helix(&self, factor: f64) -> Self {
+        self.milled_otherwise(|_| true, |milling| Some(milling.steeper(factor)))
+    }
+
+    fn milled_otherwise(
+        &self,
+        which: impl Fn(usize) -> bool,
+        otherwise: impl Fn(&MillingCut) -> Option<MillingCut>,
+    ) -> Self {
         let mut own = self.clone();
-        let cut = Arc::make_mut(&mut own.cuts[cut]);
-        if let CutKind::Milling { cut: milling, unit } = &mut cut.kind {
-            *milling = milling.deeper(factor);
-            **unit = milling.linear(cut.orders);
+        for (_, cut) in own.cuts.iter_mut().enumerate().filter(|(i, _)| which(*i)) {
+            let cut = Arc::make_mut(cut);
+            if let CutKind::Milling { cut: milling, unit } = &mut cut.kind
+                && let Some(other) = otherwise(milling)
+            {
+                *milling = other;
+                **unit = milling.linear(cut.orders);
+            }
+        }
+        own
+    }
+
+    /// Each of two cuts with the other one's record.
+    #[must_use]
+    pub fn with_exchanged(&self, [a, b]: [usize; 2]) -> Self {
+        let mut own = self.clone();
+        for (to, from) in [(a, b), (b, a)] {
+            let of = &self.cuts[from];
+            let cut = Arc::make_mut(&mut own.cuts[to]);
+            cut.sample_rate_hz = of.sample_rate_hz;
+            cut.channels.clone_from(&of.channels);
+            cut.block_s.clone_from(&of.block_s);
+            cut.steady = of.steady.clone();
+            cut.vibration.clone_from(&of.vibration);
+            cut.setting.has_vibration = of.setting.has_vibration;
+            cut.lines.clone_from(&of.lines);
+            cut.spindle.clone_from(&of.spindle);
+            cut.orders = of.orders;
+            if let CutKind::Milling { cut: milling, unit } = &mut cut.kind {
+                **unit = milling.linear(cut.orders);
+            }
+            if let (CutKind::Drilling { contact_s, .. }, CutKind::Drilling { contact_s: other, .. }) =
+                (&mut cut.kind, &of.kind)
+            {
+                *contact_s = *other;
+            }
         }
         own
     }

@@ -25,6 +25,24 @@ pub struct ForceChannel {
     pub integral: Vec<f64>,
 }
 
+impl ForceChannel {
+    /// Recorded with `factor` times the gain.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.orders.iter_mut().for_each(|line| *line *= factor);
+        for values in [&mut self.level, &mut self.integral] {
+            values.iter_mut().for_each(|value| *value *= factor);
+        }
+        self.widen(factor.abs());
+    }
+
+    /// Known `factor` times less well.
+    pub(crate) fn widen(&mut self, factor: f64) {
+        for std in self.order_std.iter_mut().chain(&mut self.level_std) {
+            *std *= factor;
+        }
+    }
+}
+
 /// White noise of a stretch of air: differences of neighbouring samples know no drift and little hum.
 pub(crate) fn sample_std<S: Sample>(samples: &[S]) -> f64 {
     let squares: f64 = samples

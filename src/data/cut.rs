@@ -59,6 +59,30 @@ impl Immersion {
             exit_rad: std::f64::consts::PI - self.start_rad,
         }
     }
+
+    /// The same side of the cutter at `factor` times the width of cut, as far as the cutter is wide. `None` where the work does not
+    /// reach to the edge on one side, or does on both: which side moves is not known then.
+    pub fn wider(self, factor: f64) -> Option<Immersion> {
+        const AT_EDGE_RAD: f64 = 1e-6;
+        let at_start = self.start_rad.abs() < AT_EDGE_RAD;
+        let at_exit = (self.exit_rad - std::f64::consts::PI).abs() < AT_EDGE_RAD;
+        if at_start == at_exit {
+            return None;
+        }
+        // A width of D (1 − cos φ) / 2.
+        let width = 1.0 - (self.exit_rad - self.start_rad).cos();
+        let arc_rad = (1.0 - (width * factor).clamp(0.0, 2.0)).acos();
+        Some(match at_start {
+            true => Immersion {
+                exit_rad: arc_rad,
+                ..self
+            },
+            false => Immersion {
+                start_rad: std::f64::consts::PI - arc_rad,
+                ..self
+            },
+        })
+    }
 }
 
 /// What was cut: geometry and feed of one record.
@@ -147,4 +171,28 @@ pub struct Cut {
     pub posture: Option<usize>,
     /// Line of `campaign.toml`, for messages.
     pub line: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_width_of_cut_grows_on_the_side_that_is_not_the_cutters_edge() {
+        let degrees = |i: Immersion| [i.start_rad, i.exit_rad].map(|a| a.to_degrees().round());
+        let of = |start: f64, exit: f64| Immersion {
+            start_rad: start.to_radians(),
+            exit_rad: exit.to_radians(),
+        };
+        // Half the diameter; a quarter of it is 60° of arc, all of it 180°, and no cut is wider.
+        for (factor, arc) in [(0.5, 60.0), (1.0, 90.0), (2.0, 180.0), (3.0, 180.0)] {
+            assert_eq!(degrees(of(0.0, 90.0).wider(factor).unwrap()), [0.0, arc]);
+            assert_eq!(
+                degrees(of(90.0, 180.0).wider(factor).unwrap()),
+                [180.0 - arc, 180.0]
+            );
+        }
+        assert_eq!(of(0.0, 180.0).wider(0.5), None);
+        assert_eq!(of(30.0, 150.0).wider(0.5), None);
+    }
 }

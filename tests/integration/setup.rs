@@ -166,6 +166,172 @@ fn a_cut_made_otherwise_than_the_list_says_is_told_with_what_it_was_made_with() 
     }
 }
 
+/// Writes a force record anew: `change(share of the record, values)` of each line's forces.
+fn rewrite(record: &Path, change: impl Fn(f64, &mut [f64])) {
+    let text = std::fs::read_to_string(record).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let is_data = |line: &str| line.starts_with(|c: char| c.is_ascii_digit());
+    let count = lines.len() as f64;
+    let changed = lines.iter().enumerate().map(|(i, line)| {
+        if !is_data(line) {
+            return (*line).to_string();
+        }
+        let (time, forces) = line.split_once(';').unwrap();
+        let mut forces: Vec<f64> = forces
+            .split(';')
+            .map(|v| v.replace(',', ".").parse().unwrap())
+            .collect();
+        change(i as f64 / count, &mut forces);
+        let forces: Vec<String> = forces
+            .iter()
+            .map(|f| format!("{f:.6}").replace('.', ","))
+            .collect();
+        format!("{time};{}", forces.join(";"))
+    });
+    let changed: Vec<String> = changed.collect();
+    std::fs::write(record, changed.join("\n")).unwrap();
+}
+
+/// Two files in kN among those in N, a range switched between two cuts, and a cable without contact.
+#[test]
+fn force_records_with_another_gain_are_named_with_it() {
+    let every = |forces: &mut [f64], gain: f64| forces.iter_mut().for_each(|f| *f *= gain);
+    type Change<'a> = &'a dyn Fn(&mut [f64]);
+    let cases: [(&[u32], Change, &str, &str, f64); 3] = [
+        (
+            &[3, 7],
+            &|f| every(f, 1e-3),
+            "channel-gain",
+            "cut 03 and 07, all channels",
+            1e-3,
+        ),
+        (
+            &[9, 10, 11, 12, 13, 14, 15, 16],
+            &|f| every(f, 0.5),
+            "channel-gain",
+            "cut 09, 10, 11, 12, 13, 14, 15 and 16, all channels",
+            0.5,
+        ),
+        (&[6], &|f| f[1] = 0.001 * f[2], "dead-channel", "cut 06, Fy", 0.0),
+    ];
+    for (cuts, change, kind, place, gain) in cases {
+        let copy = copy_of("force-9400");
+        for cut in cuts {
+            rewrite(
+                &copy.path().join(format!("force/cut{cut:02}.txt")),
+                |_, forces| change(forces),
+            );
+        }
+        let said = document(&["diagnose", copy.path().to_str().unwrap()]);
+        let found = finding(&said).unwrap_or_else(|| panic!("{place}: {}", said["setup"]));
+        assert_eq!(
+            (found["kind"].as_str(), found["where"].as_str()),
+            (Some(kind), Some(place)),
+            "{found}"
+        );
+        let value = found["value"].as_f64().unwrap();
+        assert!((value - gain).abs() <= 0.01 * gain, "{found}");
+    }
+}
+
+/// Slips in campaign.toml that concern the tool, all cuts, or two of them.
+#[test]
+fn a_wrong_helix_width_or_pair_of_files_is_told_with_the_right_one() {
+    let to_degrees = |factor: f64| (factor * 30f64.to_radians().tan()).atan().to_degrees();
+    type Truth<'a> = &'a dyn Fn(f64) -> (f64, f64);
+    let cases: [(&str, &str, &str, &str, Truth); 2] = [
+        (
+            "helix_deg = 42.0",
+            "helix_deg = 30.0",
+            "helix",
+            "tool",
+            &|factor| (to_degrees(factor), 42.0),
+        ),
+        (
+            "exit_deg = 90.0",
+            "exit_deg = 75.0",
+            "radial-width",
+            "all cuts",
+            &|factor| (factor * 0.5 * (1.0 - 75f64.to_radians().cos()), 0.5),
+        ),
+    ];
+    for (right, wrong, kind, place, truth) in cases {
+        let copy = copy_of("force-9400");
+        replace(copy.path(), right, wrong);
+        let said = document(&["cfc", copy.path().to_str().unwrap()]);
+        let found = finding(&said).unwrap_or_else(|| panic!("{wrong}: {}", said["setup"]));
+        assert_eq!(
+            (found["kind"].as_str(), found["where"].as_str()),
+            (Some(kind), Some(place)),
+            "{found}"
+        );
+        let (value, truth) = truth(found["value"].as_f64().unwrap());
+        assert!((value / truth - 1.0).abs() < 0.02, "{value} for {truth}: {found}");
+        let remedy = found["remedy"].as_str().unwrap();
+        assert!(
+            remedy.contains("helix_deg = 42.")
+                || remedy.contains("helix_deg = 41.9")
+                || remedy.contains("exit_deg = 90."),
+            "{remedy}"
+        );
+    }
+    // At the same speed the forces tell, at different ones the speeds.
+    for (a, b) in [("01", "13"), ("05", "08")] {
+        let copy = copy_of("force-9400");
+        let file = |cut: &str| format!("force/cut{cut}.txt");
+        replace(copy.path(), &file(a), "force/other.txt");
+        replace(copy.path(), &file(b), &file(a));
+        replace(copy.path(), "force/other.txt", &file(b));
+        let said = document(&["cfc", copy.path().to_str().unwrap()]);
+        let found = finding(&said).unwrap_or_else(|| panic!("{a}, {b}: {}", said["setup"]));
+        assert_eq!(
+            (found["kind"].as_str(), found["where"].as_str()),
+            (Some("cut-swap"), Some(format!("cut {a} and {b}").as_str())),
+            "{found}"
+        );
+    }
+}
+
+/// One record under two names: the cut that it is not of is left out and told.
+#[test]
+fn a_force_record_filed_twice_is_told_and_counts_once() {
+    let copy = copy_of("force-9400");
+    let record = |cut: &str| copy.path().join(format!("force/cut{cut}.txt"));
+    std::fs::copy(record("08"), record("05")).unwrap();
+    let dir = copy.path().to_str().unwrap();
+    for command in ["cfc", "diagnose"] {
+        let said = document(&[command, dir]);
+        let found = finding(&said).unwrap_or_else(|| panic!("{command}: {}", said["setup"]));
+        assert_eq!(
+            (found["kind"].as_str(), found["where"].as_str()),
+            (Some("duplicates"), Some("cut 05 and 08")),
+            "{found}"
+        );
+        let warnings = said["warnings"].to_string();
+        assert!(
+            warnings.contains("cut 05 is left out") && !warnings.contains("cut 08 is left out"),
+            "{warnings}"
+        );
+    }
+}
+
+/// An amplifier reset in the middle of a cut: the zero is put right on either side.
+#[test]
+fn a_zero_that_jumps_within_a_cut_is_put_right() {
+    let copy = copy_of("force-9400");
+    rewrite(&copy.path().join("force/cut05.txt"), |part, forces| {
+        forces[0] -= if part > 0.55 { 180.0 } else { 0.0 };
+    });
+    let dir = copy.path().to_str().unwrap();
+    let said = document(&["diagnose", dir]);
+    assert_eq!(said["verdict"], "none", "{}", said["setup"]);
+    let warnings = said["warnings"].to_string();
+    assert!(
+        warnings.contains("cut 05 (Fx by -18") && warnings.contains("jumped within the cut"),
+        "{warnings}"
+    );
+}
+
 /// A smooth error of 1 % that is new in each FRF is nothing that the model lacks.
 #[test]
 fn errors_that_each_frf_has_of_its_own_are_no_missing_physics() {

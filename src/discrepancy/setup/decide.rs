@@ -35,6 +35,8 @@ const EXPLAINS: [f64; 2] = [0.9, 0.4];
 
 /// Mistakes that make one channel late.
 const LATE: [&str; 2] = ["amplifier-low-pass", "late-channel"];
+/// Mistakes that make all forces of a cut larger by one factor: of a straight edge nothing tells them apart.
+const LARGER: [&str; 2] = ["axial-depth", "channel-gain"];
 
 /// The best that the library of effects can do on these data.
 #[derive(Debug, Clone, Default)]
@@ -121,8 +123,9 @@ pub fn decide(
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
     // Two forms of one mistake (the order of a filter, or the delay that it is) are no rivals: the better one speaks for both.
     let alike = |a: &TriedMistake, b: &TriedMistake| {
-        let late = |t: &TriedMistake| LATE.contains(&t.finding.kind);
-        a.finding.place == b.finding.place && (a.finding.kind == b.finding.kind || (late(a) && late(b)))
+        let both = |kinds: &[&str]| [a, b].iter().all(|t| kinds.contains(&t.finding.kind));
+        a.finding.place == b.finding.place
+            && (a.finding.kind == b.finding.kind || both(&LATE) || both(&LARGER))
     };
     let first_of_its_kind = |i: usize| {
         !(0..tried.len()).any(|j| {

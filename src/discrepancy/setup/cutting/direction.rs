@@ -3,14 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::plausible::{FittedReading, MUCH_BETTER, SUSPICIOUS};
+use super::plausible::{FittedReading, MUCH_BETTER, SUSPICIOUS, worst_cuts};
 use crate::discrepancy::setup::SetupFinding;
-use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
+use crate::identify::{Calibration, CuttingData};
 
 /// One more cut is taken to be milled the other way where that leaves this part of the misfit.
 const CUT_BY_CUT: f64 = 0.7;
-/// Cuts that are tried for it: those that fit worst.
-const WORST: usize = 3;
 
 /// Records read with some of their cuts milled the other way.
 struct Mirrored {
@@ -87,22 +85,9 @@ fn cut_by_cut(data: &CuttingData, one_sided: &[usize], now: &Calibration) -> Opt
             None => (Vec::new(), now.reduced_chi2, &now.theta),
         };
         let read = best.as_ref().map_or(data, |m| &m.data);
-        let model = CuttingModel::new(read, true).ok()?;
-        let fits = CuttingProblem {
-            model: &model,
-            data: read,
-        }
-        .fits(theta)
-        .ok()?;
-        let misfit = |i: usize| fits[i].chi2 / read.cuts[i].value_count().max(1) as f64;
-        let mut worst: Vec<usize> = one_sided
-            .iter()
-            .copied()
-            .filter(|i| !so_far.contains(i))
-            .collect();
-        worst.sort_by(|a, b| misfit(*b).total_cmp(&misfit(*a)));
-        worst.truncate(WORST);
-        let next = worst
+        let left_to_turn = one_sided.iter().copied().filter(|i| !so_far.contains(i));
+        let next = worst_cuts(read, theta, left_to_turn.collect())
+            .ok()?
             .into_par_iter()
             .filter_map(|i| Mirrored::new(data, [so_far.as_slice(), &[i]].concat()))
             .min_by(|a, b| a.fitted.chi2().total_cmp(&b.fitted.chi2()))?;

@@ -4,12 +4,12 @@
 //! coefficients a cut can have do not. Another reading of the channels is another `tool_from_dyno`: it is fitted anew, and
 //! those that leave equally little are told apart by their coefficients.
 
+mod change;
 mod direction;
+mod gain;
 mod plausible;
+mod robust;
 
-use std::sync::Arc;
-
-use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
@@ -19,18 +19,19 @@ use super::readings::Turn;
 use crate::Result;
 use crate::data::Process;
 use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, small_errors};
-use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
+use crate::identify::{Calibration, CuttingData, CuttingModel};
 use crate::signal::SpindleTrack;
 use crate::text::listed;
+use change::{RecordChange, SPEED_VARIATION};
 use direction::milling_direction;
-use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability};
+use gain::other_gains;
+use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
+use robust::robust;
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
 /// Cuts of which one may be said to be other than stated: of fewer each could be the one.
 const FEWEST_CUTS: usize = 4;
-/// Cuts that a wrong feed or depth is looked for in: a wrong one pulls at the coefficients and need not be the worst itself.
-const WORST_CUTS: usize = 3;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
 
@@ -40,16 +41,61 @@ const ALIKE: f64 = 1.1;
 /// # Errors
 /// Records that no model can be fitted to.
 pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<SetupCheck> {
-    let mut check = examine(data, rival)?;
+    let mut check = match data.exchanged.is_empty() {
+        true => examine(data, rival)?,
+        // At speeds that are not theirs the waveforms of these cuts are none.
+        false => SetupCheck {
+            findings: data.exchanged.iter().map(exchanged_files).collect(),
+            reduced_chi2: 1.0,
+            explained_share: 1.0,
+            ..SetupCheck::default()
+        },
+    };
     let known = check.findings.iter().any(|f| f.kind == SPEED_VARIATION);
     if let Some(finding) = speed_variation(data).filter(|_| !known) {
         check.findings.push(finding);
         check.last_taken_out = 1;
     }
+    let copied = data.copies.iter().map(copied_record);
+    check.last_taken_out += copied.len();
+    check.findings.extend(copied);
     Ok(check)
 }
 
-const SPEED_VARIATION: &str = "spindle-speed-variation";
+fn exchanged_files(cuts: &[String; 2]) -> SetupFinding {
+    SetupFinding {
+        kind: "cut-swap",
+        place: format!("cut {}", listed(cuts)),
+        value: None,
+        std_error: None,
+        unit: "",
+        confidence: 0.97,
+        remedy: format!(
+            "Swap the files of cut {}: each ran at the spindle speed stated for the other.",
+            listed(cuts)
+        ),
+    }
+}
+
+/// Two cuts under which one record was filed; it counts once at most.
+fn copied_record((cuts, not_of): &([String; 2], Option<String>)) -> SetupFinding {
+    let what = match not_of {
+        Some(id) => format!("cut {id} is left out"),
+        None => "both are left out".into(),
+    };
+    SetupFinding {
+        kind: "duplicates",
+        place: format!("cut {}", listed(cuts)),
+        value: None,
+        std_error: None,
+        unit: "",
+        confidence: 0.97,
+        remedy: format!(
+            "Both files hold the same record, sample for sample ({what}): export the record of the other cut again, or take it out of \
+             campaign.toml."
+        ),
+    }
+}
 
 /// A speed that wanders or droops, as the records were put in step for it.
 fn speed_variation(data: &CuttingData) -> Option<SetupFinding> {
@@ -94,10 +140,10 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
         return Ok(check);
     }
     if data.process != Process::Milling {
-        check.findings.extend(drilling_signs(data)?);
-        if let (true, Some(base)) = (check.findings.is_empty(), fit(data)) {
-            let changes = worst_cuts(data, &base)?.into_iter().map(Change::FeedOf);
-            try_changes(data, &base, &changes.collect::<Vec<_>>(), rival, &mut check);
+        let Some(base) = fit(data) else { return Ok(check) };
+        check.findings.extend(drilling_signs(&base));
+        if check.findings.is_empty() && leaves_more_than_noise(&base, data) {
+            try_changes(data, &base, of_some_cuts(data, &base)?, rival, &mut check);
         }
         return Ok(check);
     }
@@ -118,35 +164,40 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     }
     let base = base?;
     check.reduced_chi2 = base.reduced_chi2;
-    let mut changes: Vec<Change> = [
-        Change::GainOfY,
-        Change::SpeedWander {
+    if !leaves_more_than_noise(&base, data) {
+        return Ok(check);
+    }
+    let mut changes: Vec<RecordChange> = [
+        RecordChange::GainOfY,
+        RecordChange::SpeedWander {
             steady_in_time: false,
         },
-        Change::SpeedWander { steady_in_time: true },
-        Change::LowPass { order: 1 },
-        Change::LowPass { order: 2 },
+        RecordChange::SpeedWander { steady_in_time: true },
+        RecordChange::LowPass { order: 1 },
+        RecordChange::LowPass { order: 2 },
+        RecordChange::Width(None),
+        RecordChange::Helix,
     ]
     .into();
-    for cut in worst_cuts(data, &base)? {
-        changes.extend([Change::FeedOf(cut), Change::DepthOf(cut)]);
-    }
-    try_changes(data, &base, &changes, rival, &mut check);
+    changes.extend(of_some_cuts(data, &base)?);
+    try_changes(data, &base, changes, rival, &mut check);
     Ok(check)
 }
 
-/// Adds what `changes` explain of the misfit that the model has, fitted (`base`), where it has more than noise leaves.
+/// Whether the fitted model leaves more than noise.
+fn leaves_more_than_noise(base: &Calibration, data: &CuttingData) -> bool {
+    base.reduced_chi2 >= SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64)
+}
+
+/// Adds what `changes` explain of the misfit that the fitted model (`base`) has.
 fn try_changes(
     data: &CuttingData,
     base: &Calibration,
-    changes: &[Change],
+    changes: Vec<RecordChange>,
     rival: impl FnOnce() -> Option<Rival>,
     check: &mut SetupCheck,
 ) {
     let values = data.value_count();
-    if base.reduced_chi2 < SUSPICIOUS.min(1.0 + 30.0 / values as f64) {
-        return;
-    }
     let rivals = || Rivals {
         library: rival(),
         small_errors: None,
@@ -258,10 +309,7 @@ fn decimal(value: f64) -> String {
 }
 
 /// Thrust and torque oppose the drill: coefficients below zero are a channel of the wrong sign.
-fn drilling_signs(data: &CuttingData) -> Result<Vec<SetupFinding>> {
-    let Some(calibration) = fit(data) else {
-        return Ok(Vec::new());
-    };
+fn drilling_signs(calibration: &Calibration) -> Vec<SetupFinding> {
     let estimate = |name: &str| calibration.parameters.iter().find(|p| p.name == name);
     let channels = [("kfc_n_per_mm2", "thrust Fz"), ("ktc_n_per_mm2", "torque Mz")];
     let turned = channels.into_iter().filter_map(|(name, channel)| {
@@ -278,289 +326,45 @@ fn drilling_signs(data: &CuttingData) -> Result<Vec<SetupFinding>> {
             ),
         })
     });
-    Ok(turned.collect())
+    turned.collect()
 }
 
-/// A change of all records that one number describes; zero changes nothing.
-#[derive(Debug, Clone, Copy)]
-enum Change {
-    /// Logarithm of the gain of Fy against Fx. One of the two cannot be told from the other, for all coefficients scale with
-    /// both; nor can the gain of Fz, with which the axial coefficients scale.
-    GainOfY,
-    /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear. Where
-    /// the drive swings at a frequency of its own the same turning error is the steadier one in time, s.
-    SpeedWander { steady_in_time: bool },
-    /// Time constant of the amplifiers, s.
-    LowPass { order: u8 },
-    /// Logarithm of the true feed of one cut over the stated one.
-    FeedOf(usize),
-    /// Logarithm of the true depth of one cut over the stated one.
-    DepthOf(usize),
-}
-
-impl Change {
-    /// The data as they were before the change.
-    fn undone(self, data: &CuttingData, value: f64) -> CuttingData {
-        let mut own = data.clone();
-        match self {
-            Change::FeedOf(cut) => return data.with_feed_of(cut, value.exp()),
-            Change::DepthOf(cut) => return data.with_depth_of(cut, value.exp()),
-            Change::GainOfY => {
-                let channel = 1;
-                for row in &mut own.tool_from_dyno {
-                    row[channel] *= (-value).exp();
-                }
-                for entry in &mut own.dyno_from_tool[channel] {
-                    *entry *= value.exp();
-                }
-            }
-            Change::SpeedWander { steady_in_time } => {
-                for cut in &mut own.cuts {
-                    let angle = match steady_in_time {
-                        true => value * std::f64::consts::TAU * cut.spindle_hz(),
-                        false => value,
-                    };
-                    for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
-                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
-                        for (k, (line, std)) in lines.enumerate() {
-                            let smeared = (-0.5 * ((k + 1) as f64 * angle).powi(2)).exp().max(1e-3);
-                            *line /= smeared;
-                            *std /= smeared;
-                        }
-                    }
-                }
-            }
-            Change::LowPass { order } => {
-                for cut in &mut own.cuts {
-                    let spindle = std::f64::consts::TAU * cut.spindle_hz();
-                    let cut = Arc::make_mut(cut);
-                    for channel in cut.channels.iter_mut().flatten() {
-                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
-                        for (k, (line, std)) in lines.enumerate() {
-                            let s = Complex64::new(0.0, spindle * (k + 1) as f64 * value);
-                            let divisor = match order {
-                                1 => 1.0 + s,
-                                _ => 1.0 + s * std::f64::consts::SQRT_2 + s * s,
-                            };
-                            *line *= divisor;
-                            *std *= divisor.norm();
-                        }
-                    }
-                }
-            }
-        }
-        own
-    }
-
-    /// Values to begin with, rising.
-    fn starts(self) -> [f64; 4] {
-        match self {
-            Change::GainOfY => [-0.3, -0.1, 0.1, 0.3],
-            Change::SpeedWander {
-                steady_in_time: false,
-            } => [0.0, 5e-3, 2e-2, 5e-2],
-            Change::SpeedWander { steady_in_time: true } => [0.0, 5e-5, 2e-4, 5e-4],
-            Change::LowPass { .. } => [0.0, 5e-5, 2e-4, 6e-4],
-            Change::FeedOf(_) | Change::DepthOf(_) => [-0.7, -0.2, 0.2, 0.7],
-        }
-    }
-
-    /// What values are possible.
-    fn range(self) -> [f64; 2] {
-        match self {
-            Change::GainOfY => [-1.5, 1.5],
-            Change::SpeedWander {
-                steady_in_time: false,
-            } => [0.0, 0.3],
-            Change::SpeedWander { steady_in_time: true } => [0.0, 3e-3],
-            Change::LowPass { .. } => [0.0, 0.01],
-            Change::FeedOf(_) | Change::DepthOf(_) => [-2.5, 2.5],
-        }
-    }
-
-    /// The best value with its standard error and χ², where there is one inside what is possible.
-    fn best(self, data: &CuttingData) -> Option<(f64, f64, f64)> {
-        let [low, high] = self.range();
-        let chi2 = |value: f64| -> Option<f64> {
-            let own = self.undone(data, value);
-            Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
-        };
-        let mut points: Vec<(f64, f64)> = Vec::new();
-        for value in self.starts() {
-            points.push((value, chi2(value)?));
-        }
-        let mut around = [points[0]; 3];
-        for _ in 0..8 {
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
-            let middle = best.clamp(1, points.len() - 2);
-            around = [points[middle - 1], points[middle], points[middle + 1]];
-            // At an end of what was tried the range is widened by half.
-            let width = 0.5 * (points[points.len() - 1].0 - points[0].0);
-            let next = match best {
-                0 => (points[0].0 - width).max(low),
-                i if i + 1 == points.len() => (points[i].0 + width).min(high),
-                _ => vertex(&around)?.clamp(low, high),
-            };
-            if points
-                .iter()
-                .any(|p| (p.0 - next).abs() < 1e-3 * (next.abs() + 1e-6))
-            {
-                break;
-            }
-            points.push((next, chi2(next)?));
-        }
-        let (value, least) = points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let curvature = curvature(&around)?;
-        (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
-    }
-
-    fn tried(self, data: &CuttingData, base: f64) -> Option<TriedMistake> {
-        let (value, std, chi2) = self.best(data)?;
-        if chi2 >= base || value == 0.0 {
-            return None;
-        }
-        let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
-        let finding = match self {
-            Change::FeedOf(cut) => other_than_stated(&data.cuts[cut].id, "feed-override", "feed", value, std),
-            Change::DepthOf(cut) => {
-                other_than_stated(&data.cuts[cut].id, "axial-depth", "axial depth", value, std)
-            }
-            Change::GainOfY => {
-                let factor = value.exp();
-                let error = factor * std;
-                SetupFinding {
-                    kind: "channel-gain",
-                    place: "all cuts, Fy against Fx".into(),
-                    value: Some(factor),
-                    std_error: Some(error),
-                    unit: "1",
-                    confidence: 0.0,
-                    remedy: format!(
-                        "Calibrate the dynamometer's channels: recorded Fy is {} times what it should be (or Fx {:.4} times: \
-                         only their ratio shows).",
-                        with_error(factor, error),
-                        1.0 / factor
-                    ),
-                }
-            }
-            Change::SpeedWander { steady_in_time } => {
-                let (factor, unit) = match steady_in_time {
-                    true => (1e3, "ms"),
-                    false => (1.0, "rad"),
-                };
-                SetupFinding {
-                    kind: SPEED_VARIATION,
-                    place: "all cuts".into(),
-                    value: Some(factor * value),
-                    std_error: Some(factor * std),
-                    unit,
-                    confidence: 0.0,
-                    remedy: format!(
-                        "Average the turns over the angle of the spindle (an encoder's, or shorter records): the tool is {} \
-                         {unit} (rms) early or late while turns are averaged, which smears what is quick within a turn.",
-                        with_error(factor * value, factor * std)
-                    ),
-                }
-            }
-            Change::LowPass { order } => {
-                let corner = 1.0 / (std::f64::consts::TAU * value);
-                let error = corner * std / value;
-                SetupFinding {
-                    kind: "amplifier-low-pass",
-                    place: "all cuts, all channels".into(),
-                    value: Some(corner),
-                    std_error: Some(error),
-                    unit: "Hz",
-                    confidence: 0.0,
-                    remedy: format!(
-                        "Open the charge amplifier's low-pass filter: corner {} Hz, order {order}.",
-                        with_error(corner, error)
-                    ),
-                }
-            }
-        };
-        Some(TriedMistake {
-            finding,
-            chi2,
-            parameters: 1,
-            tried: match self {
-                Change::FeedOf(_) | Change::DepthOf(_) => 2.0 * data.cuts.len() as f64,
-                _ => 4.0,
-            },
-            at_bound: false,
-        })
-    }
-}
-
-/// A cut whose `what` was not as stated but the exponential of `value` times that.
-fn other_than_stated(id: &str, kind: &'static str, what: &str, value: f64, std: f64) -> SetupFinding {
-    let factor = value.exp();
-    let error = factor * std;
-    SetupFinding {
-        kind,
-        place: format!("cut {id}"),
-        value: Some(factor),
-        std_error: Some(error),
-        unit: "1",
-        confidence: 0.0,
-        remedy: format!(
-            "Look what {what} cut {id} was made with (the override knob, a line of the program, a slip in the cut list): its forces are \
-             those of {} times the stated one. Write the true one down, or leave the cut out.",
-            with_error(factor, error)
-        ),
-    }
-}
-
-/// Cuts that a wrong value is looked for in: those that fit worst, by index.
-fn worst_cuts(data: &CuttingData, now: &Calibration) -> Result<Vec<usize>> {
+/// What may be wrong with single cuts, or with some of them together: feed, depth or width, exchanged files, another gain.
+fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChange>> {
     if data.cuts.len() < FEWEST_CUTS {
         return Ok(Vec::new());
     }
-    let model = CuttingModel::new(data, true)?;
-    let fits = CuttingProblem { model: &model, data }.fits(&now.theta)?;
-    let misfit = |i: usize| fits[i].chi2 / data.cuts[i].value_count().max(1) as f64;
-    let mut cuts: Vec<usize> = (0..data.cuts.len()).collect();
-    cuts.sort_by(|a, b| misfit(*b).total_cmp(&misfit(*a)));
-    cuts.truncate(WORST_CUTS);
-    Ok(cuts)
-}
-
-/// Second derivative of the parabola through three points.
-fn curvature(points: &[(f64, f64)]) -> Option<f64> {
-    let [(a, fa), (b, fb), (c, fc)] = *points else {
-        return None;
+    let all = || (0..data.cuts.len()).collect();
+    let robust = robust(data);
+    let mut doubtful = worst_cuts(data, &base.theta, all())?;
+    let far_off = match &robust {
+        Some(theta) => worst_cuts(data, theta, all())?,
+        None => Vec::new(),
     };
-    let slope = |x: f64, fx: f64, y: f64, fy: f64| (fy - fx) / (y - x);
-    let second = 2.0 * (slope(b, fb, c, fc) - slope(a, fa, b, fb)) / (c - a);
-    second.is_finite().then_some(second)
-}
-
-/// Where the parabola through three points is lowest.
-fn vertex(points: &[(f64, f64)]) -> Option<f64> {
-    let [(a, fa), (b, fb), _] = *points else {
-        return None;
-    };
-    let second = curvature(points)?;
-    if second <= 0.0 {
-        return Some(a);
+    let mut changes: Vec<RecordChange> = Vec::new();
+    for (n, &a) in far_off.iter().enumerate() {
+        let others = far_off[n + 1..].iter();
+        let may_be_exchanged = others.filter(|&&b| data.cuts[a].may_be_exchanged_with(&data.cuts[b]));
+        changes.extend(may_be_exchanged.map(|&b| RecordChange::Exchanged([a.min(b), a.max(b)])));
     }
-    let slope_at_middle = (fb - fa) / (b - a);
-    Some(0.5 * (a + b) - slope_at_middle / second)
+    let gains = other_gains(data, robust.as_deref(), &far_off);
+    doubtful.extend(far_off);
+    doubtful.sort_unstable();
+    doubtful.dedup();
+    for cut in doubtful {
+        changes.push(RecordChange::FeedOf(cut));
+        if data.process == Process::Milling {
+            changes.extend([RecordChange::DepthOf(cut), RecordChange::Width(Some(cut))]);
+        }
+    }
+    changes.extend(gains.into_iter().map(RecordChange::Gain));
+    Ok(changes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::identify::forces::made_cuts::{METAL, drilled, milled};
-
-    #[test]
-    fn the_vertex_of_a_parabola_is_found() {
-        let f = |x: f64| 3.0 + 5.0 * (x - 0.7).powi(2);
-        let points = [-1.0, 0.2, 2.0].map(|x| (x, f(x)));
-        assert!((vertex(&points).unwrap() - 0.7).abs() < 1e-12);
-        assert!((curvature(&points).unwrap() - 10.0).abs() < 1e-12);
-    }
 
     #[test]
     fn a_cut_that_was_not_made_as_the_list_says_is_named_with_what_it_was_made_with() {
@@ -587,6 +391,57 @@ mod tests {
                 approx::assert_relative_eq!(found.value.unwrap(), factor, max_relative = 1e-2);
             }
         }
+    }
+
+    /// Ten cuts, slots and half slots, of a metal ten times as hard.
+    fn ten_cuts() -> CuttingData {
+        let ways = [0.05, 0.08, 0.1, 0.15, 0.2]
+            .map(|feed| [[feed, 1.0, 0.0, 180.0, 0.4], [feed, 2.0, 90.0, 180.0, -0.7]]);
+        milled(METAL.map(|k| 10.0 * k), &ways.concat())
+    }
+
+    fn first(listed: &CuttingData) -> SetupFinding {
+        let findings = examine_cutting(listed, || None).unwrap().findings;
+        let first = findings.into_iter().next().expect("a finding");
+        assert!(first.confidence > 0.9, "{first:?}");
+        first
+    }
+
+    #[test]
+    fn a_wrong_width_is_named_with_the_true_one() {
+        let made = ten_cuts();
+        for factor in [0.8, 1.25] {
+            let cases = [
+                (
+                    "radial-width",
+                    "all cuts",
+                    made.with_width_of(|_| true, 1.0 / factor),
+                ),
+                (
+                    "radial-width",
+                    "cut cut-3",
+                    made.with_width_of(|i| i == 3, 1.0 / factor),
+                ),
+            ];
+            for (kind, place, listed) in cases {
+                let found = first(&listed);
+                assert_eq!((found.kind, found.place.as_str()), (kind, place), "{found:?}");
+                approx::assert_relative_eq!(found.value.unwrap(), factor, max_relative = 2e-2);
+            }
+        }
+    }
+
+    #[test]
+    fn two_records_under_each_others_name_are_named() {
+        let made = ten_cuts();
+        let found = first(&made.with_exchanged([2, 8]));
+        assert_eq!(
+            (found.kind, found.place.as_str(), found.value),
+            ("cut-swap", "cut cut-2 and cut-8", None)
+        );
+        let mut at_other_speeds = made;
+        at_other_speeds.exchanged = vec![["a".into(), "b".into()]];
+        assert_eq!(first(&at_other_speeds).place, "cut a and b");
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! The fitted force model, and whether a cut can have its coefficients.
 
+use crate::Result;
 use crate::cutting::USUAL;
 use crate::identify::forces::cutting_study::{EXPLAINS_NRMS, calibrate_cutting, cutting_nrms};
-use crate::identify::{Calibration, CuttingData, CuttingModel};
+use crate::identify::{Calibration, CuttingData, CuttingModel, CuttingProblem};
 
 /// Another reading is believed for its waveform where it leaves this part of the misfit.
 pub(super) const MUCH_BETTER: f64 = 0.4;
@@ -10,6 +11,8 @@ pub(super) const MUCH_BETTER: f64 = 0.4;
 pub(super) const SUSPICIOUS: f64 = 1.3;
 /// Improbability (as χ²) of coefficients from which on they say that something is wrong.
 pub(super) const IMPLAUSIBLE: f64 = 9.0;
+/// Cuts that a wrong feed, depth or direction is looked for in: a wrong one pulls at the coefficients and need not be the worst itself.
+const WORST_CUTS: usize = 3;
 
 fn coefficient(calibration: &Calibration, name: &str) -> f64 {
     let found = calibration.parameters.iter().find(|p| p.name == name);
@@ -20,6 +23,16 @@ fn coefficient(calibration: &Calibration, name: &str) -> f64 {
 pub(super) fn fit(data: &CuttingData) -> Option<Calibration> {
     let model = CuttingModel::new(data, true).ok()?;
     calibrate_cutting(&model, data).ok()
+}
+
+/// The [`WORST_CUTS`] of `cuts` that the model fits worst, by index into the data's.
+pub(super) fn worst_cuts(data: &CuttingData, theta: &[f64], mut cuts: Vec<usize>) -> Result<Vec<usize>> {
+    let model = CuttingModel::new(data, true)?;
+    let fits = CuttingProblem { model: &model, data }.fits(theta)?;
+    let misfit = |i: usize| fits[i].chi2 / data.cuts[i].value_count().max(1) as f64;
+    cuts.sort_by(|a, b| misfit(*b).total_cmp(&misfit(*a)));
+    cuts.truncate(WORST_CUTS);
+    Ok(cuts)
 }
 
 /// A reading of the records, fitted.

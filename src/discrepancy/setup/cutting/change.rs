@@ -1,0 +1,413 @@
+//! What one number says of how records were made, wired or filtered, fitted to them.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+
+use super::gain::OtherGain;
+use super::plausible::fit;
+use crate::discrepancy::setup::decide::TriedMistake;
+use crate::discrepancy::setup::finding::{SetupFinding, with_error};
+use crate::identify::CuttingData;
+use crate::identify::forces::cutting_data::{CutData, CutKind};
+use crate::text::listed;
+
+pub(super) const SPEED_VARIATION: &str = "spindle-speed-variation";
+/// Nobody slips by less: what so small a change of feed, depth, width or helix takes away is something else.
+const LEAST_SLIP: f64 = 0.02;
+
+/// A change of all records that one number describes; zero changes nothing.
+#[derive(Debug, Clone)]
+pub(super) enum RecordChange {
+    /// Logarithm of the gain of Fy against Fx. One of the two cannot be told from the other, for all coefficients scale with
+    /// both; nor can the gain of Fz, with which the axial coefficients scale.
+    GainOfY,
+    /// Standard deviation of the tool's angle, rad, about its mean turning while lines are averaged: high orders smear. Where
+    /// the drive swings at a frequency of its own the same turning error is the steadier one in time, s.
+    SpeedWander { steady_in_time: bool },
+    /// Time constant of the amplifiers, s.
+    LowPass { order: u8 },
+    /// Logarithm of the true feed of one cut over the stated one.
+    FeedOf(usize),
+    /// Logarithm of the true depth of one cut over the stated one.
+    DepthOf(usize),
+    /// Logarithm of the true width over the stated one: of one cut, or of all.
+    Width(Option<usize>),
+    /// Logarithm of the true tangent of the helix over the stated one.
+    Helix,
+    /// The records of two cuts stand under each other's name: nothing to fit.
+    Exchanged([usize; 2]),
+    /// Logarithm of another gain of some records over what it looks like.
+    Gain(OtherGain),
+}
+
+impl RecordChange {
+    /// The data as they were before the change.
+    fn undone(&self, data: &CuttingData, value: f64) -> CuttingData {
+        let mut own = data.clone();
+        match self {
+            RecordChange::FeedOf(cut) => return data.with_feed_of(*cut, value.exp()),
+            RecordChange::DepthOf(cut) => return data.with_depth_of(*cut, value.exp()),
+            RecordChange::Width(only) => {
+                return data.with_width_of(|i| only.is_none_or(|one| one == i), value.exp());
+            }
+            RecordChange::Helix => return data.with_helix(value.exp()),
+            RecordChange::Exchanged(cuts) => return data.with_exchanged(*cuts),
+            RecordChange::Gain(gain) => return gain.undone(data, value.exp()),
+            RecordChange::GainOfY => {
+                let channel = 1;
+                for row in &mut own.tool_from_dyno {
+                    row[channel] *= (-value).exp();
+                }
+                for entry in &mut own.dyno_from_tool[channel] {
+                    *entry *= value.exp();
+                }
+            }
+            RecordChange::SpeedWander { steady_in_time } => {
+                for cut in &mut own.cuts {
+                    let angle = match steady_in_time {
+                        true => value * std::f64::consts::TAU * cut.spindle_hz(),
+                        false => value,
+                    };
+                    for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
+                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
+                        for (k, (line, std)) in lines.enumerate() {
+                            let smeared = (-0.5 * ((k + 1) as f64 * angle).powi(2)).exp().max(1e-3);
+                            *line /= smeared;
+                            *std /= smeared;
+                        }
+                    }
+                }
+            }
+            RecordChange::LowPass { order } => {
+                for cut in &mut own.cuts {
+                    let spindle = std::f64::consts::TAU * cut.spindle_hz();
+                    let cut = Arc::make_mut(cut);
+                    for channel in cut.channels.iter_mut().flatten() {
+                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
+                        for (k, (line, std)) in lines.enumerate() {
+                            let s = Complex64::new(0.0, spindle * (k + 1) as f64 * value);
+                            let divisor = match order {
+                                1 => 1.0 + s,
+                                _ => 1.0 + s * std::f64::consts::SQRT_2 + s * s,
+                            };
+                            *line *= divisor;
+                            *std *= divisor.norm();
+                        }
+                    }
+                }
+            }
+        }
+        own
+    }
+
+    /// Values to begin with, rising.
+    fn starts(&self) -> [f64; 4] {
+        match self {
+            RecordChange::GainOfY => [-0.3, -0.1, 0.1, 0.3],
+            RecordChange::SpeedWander {
+                steady_in_time: false,
+            } => [0.0, 5e-3, 2e-2, 5e-2],
+            RecordChange::SpeedWander { steady_in_time: true } => [0.0, 5e-5, 2e-4, 5e-4],
+            RecordChange::LowPass { .. } => [0.0, 5e-5, 2e-4, 6e-4],
+            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) => [-0.7, -0.2, 0.2, 0.7],
+            RecordChange::Width(_) | RecordChange::Helix => [-0.5, -0.15, 0.15, 0.5],
+            RecordChange::Gain(_) | RecordChange::Exchanged(_) => [-0.1, -0.02, 0.02, 0.1],
+        }
+    }
+
+    /// What values are possible.
+    fn range(&self) -> [f64; 2] {
+        match self {
+            RecordChange::GainOfY => [-1.5, 1.5],
+            RecordChange::SpeedWander {
+                steady_in_time: false,
+            } => [0.0, 0.3],
+            RecordChange::SpeedWander { steady_in_time: true } => [0.0, 3e-3],
+            RecordChange::LowPass { .. } => [0.0, 0.01],
+            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) => [-2.5, 2.5],
+            RecordChange::Width(_) | RecordChange::Helix => [-1.5, 1.5],
+            RecordChange::Gain(_) | RecordChange::Exchanged(_) => [-1.0, 1.0],
+        }
+    }
+
+    /// The best value with its standard error and χ², where there is one inside what is possible.
+    fn best(&self, data: &CuttingData) -> Option<(f64, f64, f64)> {
+        let [low, high] = self.range();
+        let chi2 = |value: f64| -> Option<f64> {
+            let own = self.undone(data, value);
+            Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
+        };
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for value in self.starts() {
+            points.push((value, chi2(value)?));
+        }
+        let mut around = [points[0]; 3];
+        for _ in 0..8 {
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
+            let middle = best.clamp(1, points.len() - 2);
+            around = [points[middle - 1], points[middle], points[middle + 1]];
+            // At an end of what was tried the range is widened by half.
+            let width = 0.5 * (points[points.len() - 1].0 - points[0].0);
+            let next = match best {
+                0 => (points[0].0 - width).max(low),
+                i if i + 1 == points.len() => (points[i].0 + width).min(high),
+                _ => vertex(&around)?.clamp(low, high),
+            };
+            if points
+                .iter()
+                .any(|p| (p.0 - next).abs() < 1e-3 * (next.abs() + 1e-6))
+            {
+                break;
+            }
+            points.push((next, chi2(next)?));
+        }
+        let (value, least) = points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let curvature = curvature(&around)?;
+        (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
+    }
+
+    pub(super) fn tried(&self, data: &CuttingData, base: f64) -> Option<TriedMistake> {
+        let (value, std, chi2) = match self {
+            RecordChange::Gain(gain) if gain.is_dead => {
+                let rest = gain.left_out(data)?;
+                let noise = (data.value_count() - rest.value_count()) as f64;
+                // A value other than none, which would mean that nothing was found.
+                (
+                    1.0,
+                    0.0,
+                    fit(&rest)?.reduced_chi2 * rest.value_count() as f64 + noise,
+                )
+            }
+            RecordChange::Exchanged(_) => {
+                let left = fit(&self.undone(data, 0.0))?.reduced_chi2;
+                (1.0, 0.0, left * data.value_count() as f64)
+            }
+            _ => self.best(data)?,
+        };
+        let is_better = chi2 < base;
+        let is_slip = match self {
+            RecordChange::FeedOf(_)
+            | RecordChange::DepthOf(_)
+            | RecordChange::Width(_)
+            | RecordChange::Helix => value.abs() >= LEAST_SLIP,
+            _ => value != 0.0,
+        };
+        if !is_better || !is_slip {
+            return None;
+        }
+        let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
+        let finding = match self {
+            RecordChange::Width(Some(cut)) => {
+                other_than_stated(&data.cuts[*cut].id, "radial-width", "radial width", value, std)
+            }
+            RecordChange::Width(None) => all_otherwise(
+                "radial-width",
+                "all cuts",
+                &true_angles(data, value.exp()),
+                value,
+                std,
+            ),
+            RecordChange::Helix => all_otherwise("helix", "tool", &true_helix(data, value.exp()), value, std),
+            RecordChange::Exchanged(cuts) => {
+                let ids = cuts.map(|i| data.cuts[i].id.clone());
+                SetupFinding {
+                    kind: "cut-swap",
+                    place: format!("cut {}", listed(&ids)),
+                    value: None,
+                    std_error: None,
+                    unit: "",
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Swap the files of cut {}: each record has the forces that the other cut asks for.",
+                        listed(&ids)
+                    ),
+                }
+            }
+            RecordChange::Gain(gain) => gain.finding(data, value, std),
+            RecordChange::FeedOf(cut) => {
+                other_than_stated(&data.cuts[*cut].id, "feed-override", "feed", value, std)
+            }
+            RecordChange::DepthOf(cut) => {
+                other_than_stated(&data.cuts[*cut].id, "axial-depth", "axial depth", value, std)
+            }
+            RecordChange::GainOfY => {
+                let factor = value.exp();
+                let error = factor * std;
+                SetupFinding {
+                    kind: "channel-gain",
+                    place: "all cuts, Fy against Fx".into(),
+                    value: Some(factor),
+                    std_error: Some(error),
+                    unit: "1",
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Calibrate the dynamometer's channels: recorded Fy is {} times what it should be (or Fx {:.4} times: \
+                         only their ratio shows).",
+                        with_error(factor, error),
+                        1.0 / factor
+                    ),
+                }
+            }
+            RecordChange::SpeedWander { steady_in_time } => {
+                let (factor, unit) = match steady_in_time {
+                    true => (1e3, "ms"),
+                    false => (1.0, "rad"),
+                };
+                SetupFinding {
+                    kind: SPEED_VARIATION,
+                    place: "all cuts".into(),
+                    value: Some(factor * value),
+                    std_error: Some(factor * std),
+                    unit,
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Average the turns over the angle of the spindle (an encoder's, or shorter records): the tool is {} \
+                         {unit} (rms) early or late while turns are averaged, which smears what is quick within a turn.",
+                        with_error(factor * value, factor * std)
+                    ),
+                }
+            }
+            RecordChange::LowPass { order } => {
+                let corner = 1.0 / (std::f64::consts::TAU * value);
+                let error = corner * std / value;
+                SetupFinding {
+                    kind: "amplifier-low-pass",
+                    place: "all cuts, all channels".into(),
+                    value: Some(corner),
+                    std_error: Some(error),
+                    unit: "Hz",
+                    confidence: 0.0,
+                    remedy: format!(
+                        "Open the charge amplifier's low-pass filter: corner {} Hz, order {order}.",
+                        with_error(corner, error)
+                    ),
+                }
+            }
+        };
+        Some(TriedMistake {
+            finding,
+            chi2,
+            parameters: usize::from(!matches!(self, RecordChange::Exchanged(_))),
+            tried: match self {
+                RecordChange::FeedOf(_) | RecordChange::DepthOf(_) | RecordChange::Width(Some(_)) => {
+                    3.0 * data.cuts.len() as f64
+                }
+                // Of one cut alone a slip of the pen is more likely than another range of all channels.
+                RecordChange::Gain(gain) if gain.is_of_one_cut() => 40.0 * data.cuts.len() as f64,
+                RecordChange::Gain(_) => 4.0 * data.cuts.len() as f64,
+                RecordChange::Exchanged(_) => (data.cuts.len() * data.cuts.len()) as f64,
+                _ => 4.0,
+            },
+            at_bound: false,
+        })
+    }
+}
+
+/// All cuts made otherwise than stated, by a factor whose logarithm is `value`; `truth`: what that comes to.
+fn all_otherwise(kind: &'static str, place: &str, truth: &str, value: f64, std: f64) -> SetupFinding {
+    let factor = value.exp();
+    let error = factor * std;
+    SetupFinding {
+        kind,
+        place: place.into(),
+        value: Some(factor),
+        std_error: Some(error),
+        unit: "1",
+        confidence: 0.0,
+        remedy: format!(
+            "The waveforms are those of {} times the stated one: {truth}. Measure it and write it down; the coefficients with the \
+             present one are wrong.",
+            with_error(factor, error)
+        ),
+    }
+}
+
+/// The angles of the first cut that was milled `factor` times as wide as stated.
+fn true_angles(data: &CuttingData, factor: f64) -> String {
+    let of_cut = |cut: &Arc<CutData>| match &cut.kind {
+        CutKind::Milling { cut: milling, .. } => Some((cut.id.clone(), milling.immersion.wider(factor)?)),
+        CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+    };
+    data.cuts
+        .iter()
+        .find_map(of_cut)
+        .map_or(String::new(), |(id, angles)| {
+            let [start, exit] = [angles.start_rad, angles.exit_rad].map(f64::to_degrees);
+            format!("a width of cut with start_deg = {start:.1}, exit_deg = {exit:.1} for cut {id}")
+        })
+}
+
+/// Helix or diameter of a tool whose edge lags `factor` times as far behind as the stated ones make it.
+fn true_helix(data: &CuttingData, factor: f64) -> String {
+    let of_cut = |cut: &Arc<CutData>| match &cut.kind {
+        CutKind::Milling { cut: milling, .. } => {
+            let diameter_mm = 1e3 * cut.cutting_speed_m_per_min / (std::f64::consts::PI * cut.spindle_rpm);
+            let tangent = milling.lag_rad * diameter_mm / (2.0 * milling.axial_depth_mm);
+            Some(((factor * tangent).atan().to_degrees(), diameter_mm / factor))
+        }
+        CutKind::Drilling { .. } | CutKind::Turning { .. } => None,
+    };
+    data.cuts
+        .iter()
+        .find_map(of_cut)
+        .map_or(String::new(), |(helix_deg, diameter_mm)| {
+            format!("helix_deg = {helix_deg:.1} with the diameter as stated, or diameter_mm = {diameter_mm:.1} with the helix as stated")
+        })
+}
+
+/// A cut whose `what` was not as stated but the exponential of `value` times that.
+fn other_than_stated(id: &str, kind: &'static str, what: &str, value: f64, std: f64) -> SetupFinding {
+    let factor = value.exp();
+    let error = factor * std;
+    SetupFinding {
+        kind,
+        place: format!("cut {id}"),
+        value: Some(factor),
+        std_error: Some(error),
+        unit: "1",
+        confidence: 0.0,
+        remedy: format!(
+            "Look what {what} cut {id} was made with (the override knob, a line of the program, a slip in the cut list; or the \
+             amplifier's range): its forces are those of {} times the stated one. Write the true one down, or leave the cut out.",
+            with_error(factor, error)
+        ),
+    }
+}
+
+/// Second derivative of the parabola through three points.
+fn curvature(points: &[(f64, f64)]) -> Option<f64> {
+    let [(a, fa), (b, fb), (c, fc)] = *points else {
+        return None;
+    };
+    let slope = |x: f64, fx: f64, y: f64, fy: f64| (fy - fx) / (y - x);
+    let second = 2.0 * (slope(b, fb, c, fc) - slope(a, fa, b, fb)) / (c - a);
+    second.is_finite().then_some(second)
+}
+
+/// Where the parabola through three points is lowest.
+fn vertex(points: &[(f64, f64)]) -> Option<f64> {
+    let [(a, fa), (b, fb), _] = *points else {
+        return None;
+    };
+    let second = curvature(points)?;
+    if second <= 0.0 {
+        return Some(a);
+    }
+    let slope_at_middle = (fb - fa) / (b - a);
+    Some(0.5 * (a + b) - slope_at_middle / second)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertex_of_a_parabola_is_found() {
+        let f = |x: f64| 3.0 + 5.0 * (x - 0.7).powi(2);
+        let points = [-1.0, 0.2, 2.0].map(|x| (x, f(x)));
+        assert!((vertex(&points).unwrap() - 0.7).abs() < 1e-12);
+        assert!((curvature(&points).unwrap() - 10.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,384 @@
+//! Records of some cuts, or one channel of them, with another gain than the rest: a range switched between two cuts, a file in
+//! kilonewtons, a plug the other way round, a cable without contact.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::plausible::fit;
+use crate::discrepancy::setup::finding::{SetupFinding, with_error};
+use crate::identify::forces::cutting_data::CutData;
+use crate::identify::{CutFit, CuttingData, CuttingModel, CuttingProblem};
+use crate::signal::median;
+use crate::text::listed;
+
+const NAMES: [&str; 4] = ["Fx", "Fy", "Fz", "Mz"];
+/// Gains that differ by less are one.
+const DEVIATES: f64 = 0.05;
+/// A deviation is so many standard errors, and so many times as far as the cuts scatter.
+const BEYOND: f64 = 5.0;
+/// A gain that is less certain than this says nothing.
+const CERTAIN: f64 = 0.1;
+/// Gains this near, over the larger, are those of one mistake.
+const ALIKE: f64 = 0.1;
+/// A channel with less of its force than this has none of it.
+const NONE_OF_IT: f64 = 0.03;
+/// Cuts before and after a switch, at least.
+const BEFORE: usize = 3;
+const AFTER: usize = 2;
+/// Mistakes looked at further.
+const MOST: usize = 3;
+
+/// Another gain of some records.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OtherGain {
+    /// By index into the data's.
+    pub(super) cuts: Vec<usize>,
+    /// 0 to 3 for Fx, Fy, Fz, Mz; `None`: all.
+    pub(super) channel: Option<usize>,
+    /// Recorded over true.
+    pub(super) factor: f64,
+    /// The channel shows none of its force, as far as the noise lets see.
+    pub(super) is_dead: bool,
+}
+
+impl OtherGain {
+    /// The records with the true gain, if that is `more` times [`OtherGain::factor`].
+    pub(super) fn undone(&self, data: &CuttingData, more: f64) -> CuttingData {
+        let mut own = data.clone();
+        for &i in &self.cuts {
+            let cut = Arc::make_mut(&mut own.cuts[i]);
+            for (channel, found) in cut.channels.iter_mut().enumerate() {
+                if self.channel.is_none_or(|only| only == channel)
+                    && let Some(found) = found
+                {
+                    found.scale(1.0 / (self.factor * more));
+                }
+            }
+        }
+        own
+    }
+
+    /// All channels of a single record.
+    pub(super) fn is_of_one_cut(&self) -> bool {
+        self.cuts.len() == 1 && self.channel.is_none()
+    }
+
+    /// The records without the channel.
+    pub(super) fn left_out(&self, data: &CuttingData) -> Option<CuttingData> {
+        let channel = self.channel?;
+        let mut own = data.clone();
+        for &i in &self.cuts {
+            let cut = Arc::make_mut(&mut own.cuts[i]);
+            cut.channels[channel] = None;
+            cut.channels.iter().any(Option::is_some).then_some(())?;
+        }
+        Some(own)
+    }
+
+    /// `value`, `std`: logarithm of what the gain is over [`OtherGain::factor`].
+    pub(super) fn finding(&self, data: &CuttingData, value: f64, std: f64) -> SetupFinding {
+        let factor = self.factor * value.exp();
+        let error = (factor * std).abs();
+        let ids: Vec<String> = self.cuts.iter().map(|&i| data.cuts[i].id.clone()).collect();
+        let what = self.channel.map_or("all channels", |c| NAMES[c]);
+        let place = match self.is_of_one_cut() {
+            true => format!("cut {}", listed(&ids)),
+            false => format!("cut {}, {what}", listed(&ids)),
+        };
+        let unit = |of: f64| (factor.abs() / of).ln().abs() < DEVIATES;
+        let (kind, told) = if self.is_dead {
+            (
+                "dead-channel",
+                format!(
+                    "{what} shows none of the force that the other channels and cuts ask for: look at its cable, plug and amplifier, and \
+                     leave this channel of cut {} out (or the cut).",
+                    listed(&ids)
+                ),
+            )
+        } else {
+            let because = if (factor + 1.0).abs() < ALIKE {
+                "as if a plug, the polarity or an axis were turned round between the cuts".to_string()
+            } else if unit(1e-3) {
+                "as if these files were in kN and the others in N".into()
+            } else if unit(1e3) {
+                "as if these files were in N and the others in kN".into()
+            } else if unit(4.448_221_615) || unit(1.0 / 4.448_221_615) {
+                "as if pounds-force and newtons were mixed".into()
+            } else {
+                "as if a range or sensitivity of the amplifier had been switched".into()
+            };
+            let kind = if (factor + 1.0).abs() < ALIKE {
+                "channel-sign"
+            } else {
+                "channel-gain"
+            };
+            (
+                kind,
+                format!(
+                    "Recorded is {} times what the other cuts ask for, {because}. Find out which of the two is right; for each of these cuts \
+                     a [[channel]] with `cut`, `name`, and `unit`, `sign` or `gain_n_per_unit` puts it right.",
+                    with_error(factor, error)
+                ),
+            )
+        };
+        SetupFinding {
+            kind,
+            place,
+            value: Some(if self.is_dead { 0.0 } else { factor }),
+            std_error: (!self.is_dead).then_some(error),
+            unit: "1",
+            confidence: 0.0,
+            remedy: told,
+        }
+    }
+}
+
+/// By channel, recorded over what the model says, with its standard error.
+type Gains = [Option<(f64, f64)>; 4];
+
+/// The gains of every cut against the model with `theta`.
+fn gains(data: &CuttingData, theta: &[f64]) -> Option<Vec<Gains>> {
+    let model = CuttingModel::new(data, true).ok()?;
+    let fits = CuttingProblem { model: &model, data }.fits(theta).ok()?;
+    let of_cut = |(cut, fit): (_, &CutFit)| {
+        let cut: &CutData = cut;
+        std::array::from_fn(|i| {
+            let (recorded, model) = (cut.channels[i].as_ref()?, fit.channels[i].as_ref()?);
+            let (mut both, mut own) = (0.0, 0.0);
+            for ((m, d), std) in model.orders.iter().zip(&recorded.orders).zip(&recorded.order_std) {
+                both += 2.0 * (m.conj() * d).re / (std * std);
+                own += 2.0 * m.norm_sqr() / (std * std);
+            }
+            for b in cut.steady.clone() {
+                let (m, std) = (model.level[b], recorded.level_std[b]);
+                both += m * (recorded.level[b] - model.reference[b]) / (std * std);
+                own += m * m / (std * std);
+            }
+            (own > 0.0).then(|| (both / own, own.sqrt().recip()))
+        })
+    };
+    Some(
+        data.cuts
+            .iter()
+            .map(|c| c.as_ref())
+            .zip(&fits)
+            .map(of_cut)
+            .collect(),
+    )
+}
+
+/// What one gain would make of a record's: all channels alike, or one channel alone. `usual`: gain and scatter of each channel.
+fn pattern(cuts: Vec<usize>, gains: &Gains, usual: &[(f64, f64); 4]) -> Option<OtherGain> {
+    struct Known {
+        channel: usize,
+        gain: f64,
+        std: f64,
+        deviates: bool,
+    }
+    let known: Vec<Known> = (0..4)
+        .filter_map(|i| {
+            let (gain, std) = gains[i]?;
+            let (middle, scatter) = usual[i];
+            let (gain, std) = (gain / middle, (std / middle).abs());
+            let beyond = DEVIATES.max(BEYOND * std).max(BEYOND * scatter);
+            (std < CERTAIN && gain.is_finite()).then_some(Known {
+                channel: i,
+                gain,
+                std,
+                deviates: (gain - 1.0).abs() > beyond,
+            })
+        })
+        .collect();
+    let other: Vec<&Known> = known.iter().filter(|k| k.deviates).collect();
+    let (channel, factor, is_dead) = match other.as_slice() {
+        [] => return None,
+        [one] if known.len() > 1 => {
+            let is_dead = one.gain.abs() < NONE_OF_IT && one.gain.abs() < BEYOND * one.std;
+            (Some(one.channel), one.gain, is_dead)
+        }
+        all if all.len() == known.len() => {
+            let mean = all.iter().map(|k| k.gain).sum::<f64>() / all.len() as f64;
+            let is_one = mean != 0.0 && all.iter().all(|k| is_alike(k.gain, mean));
+            is_one.then_some((None, mean, false))?
+        }
+        _ => return None,
+    };
+    Some(OtherGain {
+        cuts,
+        channel,
+        factor,
+        is_dead,
+    })
+}
+
+fn is_alike(a: f64, b: f64) -> bool {
+    (a - b).abs() < ALIKE * a.abs().max(b.abs()).max(NONE_OF_IT)
+}
+
+/// Cuts that stand far from the rest, by what is alike of them.
+fn single_cuts(data: &CuttingData, robust: &[f64]) -> Option<Vec<OtherGain>> {
+    let gains = gains(data, robust)?;
+    let usual: [(f64, f64); 4] = std::array::from_fn(|i| {
+        let all: Vec<f64> = gains.iter().filter_map(|g| Some(g[i]?.0)).collect();
+        let middle = median(&all);
+        let apart: Vec<f64> = all.iter().map(|g| (g / middle - 1.0).abs()).collect();
+        (middle, 1.4826 * median(&apart))
+    });
+    let mut found: Vec<OtherGain> = Vec::new();
+    for (i, own) in gains.iter().enumerate() {
+        let Some(one) = pattern(vec![i], own, &usual) else {
+            continue;
+        };
+        let same = |f: &&mut OtherGain| {
+            f.channel == one.channel && f.is_dead == one.is_dead && is_alike(f.factor, one.factor)
+        };
+        match found.iter_mut().find(same) {
+            Some(same) => same.cuts.push(i),
+            None => found.push(one),
+        }
+    }
+    found.retain(|f| 2 * f.cuts.len() < data.cuts.len());
+    found.sort_by_key(|f| std::cmp::Reverse(f.cuts.len()));
+    found.truncate(MOST);
+    Some(found)
+}
+
+/// Each channel with the other sign in `cuts`. (The phase that is fitted to each cut hides such a channel from its gain.)
+fn turned_round(data: &CuttingData, cuts: &[usize]) -> impl Iterator<Item = OtherGain> {
+    let recorded = |channel: &usize| cuts.iter().all(|&i| data.cuts[i].channels[*channel].is_some());
+    (0..4).filter(recorded).map(|channel| OtherGain {
+        cuts: cuts.to_vec(),
+        channel: Some(channel),
+        factor: -1.0,
+        is_dead: false,
+    })
+}
+
+/// A gain that is another one from some cut of a sequence on.
+fn switched(data: &CuttingData, sequence: &[usize]) -> Option<OtherGain> {
+    let last = sequence.len().checked_sub(AFTER)?;
+    (BEFORE..=last)
+        .into_par_iter()
+        .filter_map(|at| {
+            let (before, after) = sequence.split_at(at);
+            let base = fit(&data.filtered(|i| before.contains(&i)))?;
+            let gains = gains(data, &base.theta)?;
+            let of_channel = |i: usize| {
+                let all: Vec<(f64, f64)> = after.iter().filter_map(|&c| gains[c][i]).collect();
+                let weight: f64 = all.iter().map(|g| g.1.powi(-2)).sum();
+                let mean = all.iter().map(|g| g.0 * g.1.powi(-2)).sum::<f64>() / weight;
+                (weight > 0.0).then(|| (mean, weight.sqrt().recip()))
+            };
+            let mut cuts = after.to_vec();
+            cuts.sort_unstable();
+            let seen = pattern(cuts.clone(), &std::array::from_fn(of_channel), &[(1.0, 0.0); 4]);
+            let seen = seen.filter(|found| !found.is_dead);
+            let tried = turned_round(data, &cuts).chain(seen).filter_map(|found| {
+                let left = fit(&found.undone(data, 1.0))?.reduced_chi2;
+                Some((found, left))
+            });
+            tried.min_by(|a, b| a.1.total_cmp(&b.1))
+        })
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|best| best.0)
+}
+
+/// Gains to be tried: of single cuts, and switched at some time, in the order of making or in that of the list.
+/// `robust`: parameters on which a few wrong records have no influence; `far_off`: the cuts that stand farthest from them.
+pub(super) fn other_gains(data: &CuttingData, robust: Option<&[f64]>, far_off: &[usize]) -> Vec<OtherGain> {
+    let mut found = robust
+        .and_then(|theta| single_cuts(data, theta))
+        .unwrap_or_default();
+    let listed: Vec<usize> = (0..data.cuts.len()).collect();
+    let mut made = listed.clone();
+    made.sort_by_key(|&i| (data.cuts[i].order, i));
+    for &cut in far_off {
+        found.extend(turned_round(data, &[cut]));
+    }
+    let mut sequences = vec![listed];
+    if !sequences.contains(&made) {
+        sequences.push(made);
+    }
+    for switched in sequences.iter().filter_map(|s| switched(data, s)) {
+        if !found
+            .iter()
+            .any(|f| f.cuts == switched.cuts && f.channel == switched.channel)
+        {
+            found.push(switched);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discrepancy::setup::examine_cutting;
+    use crate::identify::forces::made_cuts::{METAL, milled};
+
+    /// Ten slots and half slots of five feeds, of a metal so hard that errors of 1 N hide nothing.
+    fn made() -> CuttingData {
+        let ways = [0.05, 0.08, 0.1, 0.15, 0.2]
+            .map(|feed| [[feed, 1.0, 0.0, 180.0, 0.4], [feed, 2.0, 90.0, 180.0, -0.7]]);
+        milled(METAL.map(|k| 10.0 * k), &ways.concat())
+    }
+
+    fn found(data: &CuttingData, case: &str) -> SetupFinding {
+        let findings = examine_cutting(data, || None).unwrap().findings;
+        findings.into_iter().next().expect(case)
+    }
+
+    #[test]
+    fn some_records_with_another_gain_are_named_with_it() {
+        let made = made();
+        assert_eq!(examine_cutting(&made, || None).unwrap().findings, []);
+        let all: [(&[usize], Option<usize>, f64, &str); 7] = [
+            (&[3], None, 0.01, "channel-gain"),
+            (&[2, 6], None, 1e-3, "channel-gain"),
+            (&[5, 6, 7, 8, 9], None, 0.5, "channel-gain"),
+            (&[4, 5, 6, 7, 8, 9], Some(1), -1.0, "channel-sign"),
+            (&[6], Some(1), -1.0, "channel-sign"),
+            (&[1], Some(0), 1.0 / 4.448_221_615, "channel-gain"),
+            (&[0, 7], Some(1), 1.2, "channel-gain"),
+        ];
+        for (cuts, channel, factor, kind) in all {
+            let other = OtherGain {
+                cuts: cuts.to_vec(),
+                channel,
+                factor: 1.0 / factor,
+                is_dead: false,
+            };
+            let found = found(&other.undone(&made, 1.0), &format!("{other:?}"));
+            let ids: Vec<String> = cuts.iter().map(|&i| made.cuts[i].id.clone()).collect();
+            let what = match (channel, cuts) {
+                (None, [_]) => String::new(),
+                (None, _) => ", all channels".into(),
+                (Some(c), _) => format!(", {}", NAMES[c]),
+            };
+            assert_eq!(
+                (found.kind, found.place.as_str()),
+                (kind, format!("cut {}{what}", listed(&ids)).as_str()),
+                "{found:?}"
+            );
+            assert!(found.confidence > 0.9, "{found:?}");
+            approx::assert_relative_eq!(found.value.unwrap(), factor, max_relative = 1e-2);
+        }
+    }
+
+    #[test]
+    fn a_channel_without_its_force_is_named() {
+        let mut made = made();
+        let cut = Arc::make_mut(&mut made.cuts[4]);
+        let channel = cut.channels[1].as_mut().unwrap();
+        channel.orders.iter_mut().for_each(|line| *line *= 0.0);
+        channel.level.iter_mut().for_each(|level| *level = 3.0);
+        let found = found(&made, "dead");
+        assert_eq!(
+            (found.kind, found.value),
+            ("dead-channel", Some(0.0)),
+            "{found:?}"
+        );
+        assert!(found.place.ends_with("Fy") && found.confidence > 0.9, "{found:?}");
+    }
+}

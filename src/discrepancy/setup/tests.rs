@@ -192,6 +192,32 @@ fn a_sign_of_a_whole_posture_is_found() {
     assert_eq!((found.kind, found.place.as_str()), ("channel-sign", "posture d"));
 }
 
+/// A channel that records noise alone at one posture is no file of another quantity, which would hide the structure as well.
+#[test]
+fn a_channel_that_shows_nothing_is_found() {
+    let model = model();
+    let mut data = measured(&model, None, 5);
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut normal = || crate::statistics::nearly_normal(&mut random) * std::f64::consts::FRAC_1_SQRT_2;
+    let block = Arc::make_mut(&mut data.blocks[3]);
+    let axis = block.frfs[0].response.axis;
+    for frf in block.frfs.iter_mut().filter(|f| f.response.axis == axis) {
+        for (h, std) in frf.receptance.iter_mut().zip(&frf.noise_std) {
+            *h = Complex64::new(normal(), normal()) * *std;
+        }
+    }
+    let check = check(&model, &data);
+    let found = check.likely().expect("a dead channel");
+    assert_eq!(
+        (found.kind, found.place.as_str(), found.value),
+        (
+            "dead-channel",
+            format!("posture d, response {}", axis.letter()).as_str(),
+            Some(0.0)
+        )
+    );
+}
+
 /// A file filed under another posture, exchanged files, and signs.
 #[test]
 fn wrong_readings_are_found() {

@@ -141,9 +141,12 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     }
     if data.process != Process::Milling {
         let Some(base) = fit(data) else { return Ok(check) };
-        check.findings.extend(drilling_signs(&base));
-        if check.findings.is_empty() && leaves_more_than_noise(&base, data) {
+        if leaves_more_than_noise(&base, data) {
             try_changes(data, &base, of_some_cuts(data, &base)?, rival, &mut check);
+        }
+        // Turned round in all cuts a channel fits as well; in some of them it does not.
+        if !check.findings.iter().any(SetupFinding::is_likely) {
+            check.findings.splice(0..0, drilling_signs(&base));
         }
         return Ok(check);
     }

@@ -2,6 +2,7 @@
 
 mod axes;
 mod channel_sign;
+mod dead_channel;
 mod joint_convention;
 mod phase_conjugated;
 mod point_frame;

@@ -3,7 +3,8 @@
 use super::proposal::Proposed;
 use super::table::DistanceTable;
 use super::{
-    axes, channel_sign, joint_convention, phase_conjugated, point_frame, point_swap, posture_swap, quantity,
+    axes, channel_sign, dead_channel, joint_convention, phase_conjugated, point_frame, point_swap,
+    posture_swap, quantity,
 };
 use crate::Result;
 use crate::identify::StructureModel;
@@ -33,6 +34,7 @@ pub fn proposed(
         // Before the axes, which have names for a sign as well.
         here.extend(channel_sign::proposed(&table, data));
         here.extend(axes::proposed(&table, data));
+        here.extend(dead_channel::proposed(&table, data));
         here.extend(phase_conjugated::proposed(&table, data));
         here.extend(quantity::proposed(&table, data));
         here.extend(point_frame::proposed(&table, model, data, theta)?);

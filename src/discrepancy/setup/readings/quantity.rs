@@ -5,6 +5,7 @@ use num_complex::Complex64;
 use super::super::finding::SetupFinding;
 use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
+use super::dead_channel::over_noise;
 use super::proposal::Proposed;
 use super::table::{DistanceTable, distance};
 use crate::data::Point;
@@ -73,7 +74,14 @@ pub fn proposed(table: &DistanceTable, data: &FrfData) -> Vec<Proposed> {
                 distance(lines.map(|(m, f)| m * factor(*f, power)), frf)
             })
             .collect();
-        for group in FrfGroup::channels(data) {
+        // Read so, the structure would hardly be seen in the file: any file that shows nothing would do.
+        let is_seen = |group: &FrfGroup| {
+            data.frfs().enumerate().any(|(i, (block, frf))| {
+                let read = table.own(i, frf).iter().zip(&block.frequency_hz);
+                group.holds(frf) && over_noise(read.map(|(m, f)| m * factor(*f, power)), frf) > 1.0
+            })
+        };
+        for group in FrfGroup::channels(data).into_iter().filter(is_seen) {
             all.push(Proposed {
                 gain: table.gain(data, &group, |i, _| turned[i]),
                 reading: Box::new(MisreadQuantity { group, power }),

@@ -384,6 +384,17 @@ fn apply(record: &mut TimeRecord, rules: &[&ChannelRule]) -> std::result::Result
                 }
             },
         };
+        if let (Some(said), Some(ours), Gain::None) = (said, rule.unit, &rule.gain)
+            && (ours.factor / said.factor - 1.0).abs() > 1e-9
+        {
+            notes.about(
+                &channel.name,
+                format!(
+                    "the file says {:?}, and that counts, not the unit of its [[channel]]: where the file is wrong, give gain_n_per_unit",
+                    channel.file_unit
+                ),
+            );
+        }
         let to_si = if said.is_some() { 1.0 } else { factor };
         let sign = if rule.is_reversed { -1.0 } else { 1.0 };
         for value in &mut channel.samples {
@@ -629,10 +640,14 @@ mod tests {
     }
 
     fn read(text: &str, rules: &[ChannelRule]) -> Result<TimeRecord> {
+        read_and_told(text, rules).map(|r| r.0)
+    }
+
+    fn read_and_told(text: &str, rules: &[ChannelRule]) -> Result<(TimeRecord, Vec<String>)> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("r.txt");
         std::fs::write(&path, text).unwrap();
-        read_time_with(&path, rules).map(|r| r.record)
+        read_time_with(&path, rules).map(|r| (r.record, r.warnings))
     }
 
     #[test]
@@ -711,6 +726,17 @@ mod tests {
                 .to_string()
                 .contains("another unit")
         );
+        // Of one dimension the file's counts, and it is told.
+        let text = text.replace("Fx_R_1 [mV],Fx_R_2 [mV]", "Fx [N],Fy [N]");
+        let mut x = rule(ChannelRole::ForceX, Source::Name("fx".into()));
+        x.unit = units::parse("kN");
+        let (record, told) = read_and_told(&text, &[x.clone()]).unwrap();
+        assert_eq!(record.channel(ChannelRole::ForceX).unwrap().samples[3], 3.0);
+        assert!(told.join(" ").contains("gain_n_per_unit"), "{told:?}");
+        (x.unit, x.gain) = (None, Gain::PerUnit(1000.0));
+        let (record, told) = read_and_told(&text, &[x]).unwrap();
+        assert_eq!(record.channel(ChannelRole::ForceX).unwrap().samples[3], 3000.0);
+        assert!(!told.join(" ").contains("gain_n_per_unit"), "{told:?}");
     }
 
     #[test]

@@ -205,11 +205,19 @@ impl RecordChange {
             RecordChange::Width(None) => all_otherwise(
                 "radial-width",
                 "all cuts",
+                "width of cut",
                 &true_angles(data, value.exp()),
                 value,
                 std,
             ),
-            RecordChange::Helix => all_otherwise("helix", "tool", &true_helix(data, value.exp()), value, std),
+            RecordChange::Helix => all_otherwise(
+                "helix",
+                "tool",
+                "tan(helix)/diameter",
+                &true_helix(data, value.exp()),
+                value,
+                std,
+            ),
             RecordChange::Exchanged(cuts) => {
                 let ids = cuts.map(|i| data.cuts[i].id.clone());
                 SetupFinding {
@@ -305,8 +313,15 @@ impl RecordChange {
     }
 }
 
-/// All cuts made otherwise than stated, by a factor whose logarithm is `value`; `truth`: what that comes to.
-fn all_otherwise(kind: &'static str, place: &str, truth: &str, value: f64, std: f64) -> SetupFinding {
+/// All cuts made otherwise than stated, by a factor on `what` whose logarithm is `value`; `truth`: what that comes to.
+fn all_otherwise(
+    kind: &'static str,
+    place: &str,
+    what: &str,
+    truth: &str,
+    value: f64,
+    std: f64,
+) -> SetupFinding {
     let factor = value.exp();
     let error = factor * std;
     SetupFinding {
@@ -317,7 +332,7 @@ fn all_otherwise(kind: &'static str, place: &str, truth: &str, value: f64, std: 
         unit: "1",
         confidence: 0.0,
         remedy: format!(
-            "The waveforms are those of {} times the stated one: {truth}. Measure it and write it down; the coefficients with the \
+            "The waveforms are those of {} times the stated {what}: {truth}. Measure it and write it down; the coefficients with the \
              present one are wrong.",
             with_error(factor, error)
         ),
@@ -335,7 +350,7 @@ fn true_angles(data: &CuttingData, factor: f64) -> String {
         .find_map(of_cut)
         .map_or(String::new(), |(id, angles)| {
             let [start, exit] = [angles.start_rad, angles.exit_rad].map(f64::to_degrees);
-            format!("a width of cut with start_deg = {start:.1}, exit_deg = {exit:.1} for cut {id}")
+            format!("start_deg = {start:.1}, exit_deg = {exit:.1} for cut {id}")
         })
 }
 

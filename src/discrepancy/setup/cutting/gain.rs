@@ -10,7 +10,7 @@ use crate::discrepancy::setup::finding::{SetupFinding, with_error};
 use crate::identify::forces::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData, CuttingModel, CuttingProblem};
 use crate::signal::median;
-use crate::text::listed;
+use crate::text::{figures, listed};
 
 const NAMES: [&str; 4] = ["Fx", "Fy", "Fz", "Mz"];
 /// Gains that differ by less are one.
@@ -117,8 +117,12 @@ impl OtherGain {
                 kind,
                 format!(
                     "Recorded is {} times what the other cuts ask for, {because}. Find out which of the two is right; for each of these cuts \
-                     a [[channel]] with `cut`, `name`, and `unit`, `sign` or `gain_n_per_unit` puts it right.",
-                    with_error(factor, error)
+                     a [[channel]] with `cut`, `name` and `{}` puts it right.",
+                    with_error(factor, error),
+                    match kind {
+                        "channel-sign" => "sign = -1".to_string(),
+                        _ => format!("gain_n_per_unit = {}", figures(1.0 / factor, 4)),
+                    }
                 ),
             )
         };

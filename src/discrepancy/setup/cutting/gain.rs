@@ -26,6 +26,8 @@ const NONE_OF_IT: f64 = 0.03;
 /// Cuts before and after a switch, at least.
 const BEFORE: usize = 3;
 const AFTER: usize = 2;
+/// Places in a sequence at which a switch is looked for first.
+const STEPS: usize = 24;
 /// Mistakes looked at further.
 const MOST: usize = 3;
 
@@ -259,33 +261,45 @@ fn turned_round(data: &CuttingData, cuts: &[usize]) -> impl Iterator<Item = Othe
     })
 }
 
-/// A gain that is another one from some cut of a sequence on.
+/// A gain that is another one from some cut of a sequence on: looked for in steps, then one by one.
 fn switched(data: &CuttingData, sequence: &[usize]) -> Option<OtherGain> {
     let last = sequence.len().checked_sub(AFTER)?;
-    (BEFORE..=last)
-        .into_par_iter()
-        .filter_map(|at| {
-            let (before, after) = sequence.split_at(at);
-            let base = fit(&data.filtered(|i| before.contains(&i)))?;
-            let gains = gains(data, &base.theta)?;
-            let of_channel = |i: usize| {
-                let all: Vec<(f64, f64)> = after.iter().filter_map(|&c| gains[c][i]).collect();
-                let weight: f64 = all.iter().map(|g| g.1.powi(-2)).sum();
-                let mean = all.iter().map(|g| g.0 * g.1.powi(-2)).sum::<f64>() / weight;
-                (weight > 0.0).then(|| (mean, weight.sqrt().recip()))
-            };
-            let mut cuts = after.to_vec();
-            cuts.sort_unstable();
-            let seen = pattern(cuts.clone(), &std::array::from_fn(of_channel), &[(1.0, 0.0); 4]);
-            let seen = seen.filter(|found| !found.is_dead);
-            let tried = turned_round(data, &cuts).chain(seen).filter_map(|found| {
-                let left = fit(&found.undone(data, 1.0))?.reduced_chi2;
-                Some((found, left))
-            });
-            tried.min_by(|a, b| a.1.total_cmp(&b.1))
-        })
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|best| best.0)
+    let step = sequence.len().div_ceil(STEPS);
+    let best = |places: Vec<usize>| {
+        places
+            .into_par_iter()
+            .filter_map(|at| Some((at, switched_at(data, sequence.split_at_checked(at)?)?)))
+            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
+    };
+    let (at, coarse) = best((BEFORE..=last).step_by(step).collect())?;
+    let beside = (at + 1).saturating_sub(step).max(BEFORE)..=(at + step - 1).min(last);
+    let fine = best(beside.filter(|other| *other != at).collect());
+    let (found, _) = fine
+        .map(|f| f.1)
+        .filter(|fine| fine.1 < coarse.1)
+        .unwrap_or(coarse);
+    Some(found)
+}
+
+/// The gain of the cuts `after` against those `before`, and the misfit per value that is left with it.
+fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Option<(OtherGain, f64)> {
+    let base = fit(&data.filtered(|i| before.contains(&i)))?;
+    let gains = gains(data, &base.theta)?;
+    let of_channel = |i: usize| {
+        let all: Vec<(f64, f64)> = after.iter().filter_map(|&c| gains[c][i]).collect();
+        let weight: f64 = all.iter().map(|g| g.1.powi(-2)).sum();
+        let mean = all.iter().map(|g| g.0 * g.1.powi(-2)).sum::<f64>() / weight;
+        (weight > 0.0).then(|| (mean, weight.sqrt().recip()))
+    };
+    let mut cuts = after.to_vec();
+    cuts.sort_unstable();
+    let seen = pattern(cuts.clone(), &std::array::from_fn(of_channel), &[(1.0, 0.0); 4]);
+    let seen = seen.filter(|found| !found.is_dead);
+    let tried = turned_round(data, &cuts).chain(seen).filter_map(|found| {
+        let left = fit(&found.undone(data, 1.0))?.reduced_chi2;
+        Some((found, left))
+    });
+    tried.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Gains to be tried: of single cuts, and switched at some time, in the order of making or in that of the list.

@@ -728,7 +728,7 @@ mod tests {
         );
         // Of one dimension the file's counts, and it is told.
         let text = text.replace("Fx_R_1 [mV],Fx_R_2 [mV]", "Fx [N],Fy [N]");
-        let mut x = rule(ChannelRole::ForceX, Source::Name("fx".into()));
+        let mut x = rule(ChannelRole::ForceX, Source::Name("fx [n]".into()));
         x.unit = units::parse("kN");
         let (record, told) = read_and_told(&text, &[x.clone()]).unwrap();
         assert_eq!(record.channel(ChannelRole::ForceX).unwrap().samples[3], 3.0);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::plausible::fit;
+use super::robust::RobustFit;
 use crate::discrepancy::setup::finding::{SetupFinding, with_error};
 use crate::identify::forces::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData, CuttingModel, CuttingProblem};
@@ -223,8 +224,9 @@ fn is_alike(a: f64, b: f64) -> bool {
 }
 
 /// Cuts that stand far from the rest, by what is alike of them.
-fn single_cuts(data: &CuttingData, robust: &[f64]) -> Option<Vec<OtherGain>> {
-    let gains = gains(data, robust)?;
+fn single_cuts(robust: &RobustFit) -> Option<Vec<OtherGain>> {
+    // With noise alike in all channels none of them alone decides on the phase of a cut.
+    let gains = gains(&robust.even, &robust.theta)?;
     let usual: [(f64, f64); 4] = std::array::from_fn(|i| {
         let all: Vec<f64> = gains.iter().filter_map(|g| Some(g[i]?.0)).collect();
         let middle = median(&all);
@@ -244,7 +246,7 @@ fn single_cuts(data: &CuttingData, robust: &[f64]) -> Option<Vec<OtherGain>> {
             None => found.push(one),
         }
     }
-    found.retain(|f| 2 * f.cuts.len() < data.cuts.len());
+    found.retain(|f| 2 * f.cuts.len() < gains.len());
     found.sort_by_key(|f| std::cmp::Reverse(f.cuts.len()));
     found.truncate(MOST);
     Some(found)
@@ -303,11 +305,13 @@ fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Opt
 }
 
 /// Gains to be tried: of single cuts, and switched at some time, in the order of making or in that of the list.
-/// `robust`: parameters on which a few wrong records have no influence; `far_off`: the cuts that stand farthest from them.
-pub(super) fn other_gains(data: &CuttingData, robust: Option<&[f64]>, far_off: &[usize]) -> Vec<OtherGain> {
-    let mut found = robust
-        .and_then(|theta| single_cuts(data, theta))
-        .unwrap_or_default();
+/// `far_off`: the cuts that stand farthest from the `robust` fit.
+pub(super) fn other_gains(
+    data: &CuttingData,
+    robust: Option<&RobustFit>,
+    far_off: &[usize],
+) -> Vec<OtherGain> {
+    let mut found = robust.and_then(single_cuts).unwrap_or_default();
     let listed: Vec<usize> = (0..data.cuts.len()).collect();
     let mut made = listed.clone();
     made.sort_by_key(|&i| (data.cuts[i].order, i));

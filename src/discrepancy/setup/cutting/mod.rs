@@ -26,7 +26,7 @@ use change::{RecordChange, SPEED_VARIATION};
 use direction::milling_direction;
 use gain::other_gains;
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
-use robust::robust;
+use robust::RobustFit;
 
 /// Cuts that readings of the axes are tried on.
 const CUTS: usize = 4;
@@ -338,10 +338,10 @@ fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChan
         return Ok(Vec::new());
     }
     let all = || (0..data.cuts.len()).collect();
-    let robust = robust(data);
+    let robust = RobustFit::of(data);
     let mut doubtful = worst_cuts(data, &base.theta, all())?;
     let far_off = match &robust {
-        Some(theta) => worst_cuts(data, theta, all())?,
+        Some(robust) => worst_cuts(&robust.even, &robust.theta, all())?,
         None => Vec::new(),
     };
     let mut changes: Vec<RecordChange> = Vec::new();
@@ -350,7 +350,7 @@ fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChan
         let may_be_exchanged = others.filter(|&&b| data.cuts[a].may_be_exchanged_with(&data.cuts[b]));
         changes.extend(may_be_exchanged.map(|&b| RecordChange::Exchanged([a.min(b), a.max(b)])));
     }
-    let gains = other_gains(data, robust.as_deref(), &far_off);
+    let gains = other_gains(data, robust.as_ref(), &far_off);
     doubtful.extend(far_off);
     doubtful.sort_unstable();
     doubtful.dedup();

@@ -180,16 +180,6 @@ fn turn_torque(cuts: &mut [CutAnalysis], warnings: &mut Vec<String>) {
     warnings.push("Mz is negative in every hole: it is taken as counted the other way round".into());
 }
 
-/// Do two cuts rest on the same samples? One file may hold several cuts: one after the other (`steady_s`), or each in channels of
-/// its own.
-fn is_same_stretch(trials: &CuttingTrials, a: &CutAnalysis, b: &CutAnalysis) -> bool {
-    let same_file = trials.cuts[a.cut].file == trials.cuts[b.cut].file;
-    let both = a.steady_s[1].min(b.steady_s[1]) - a.steady_s[0].max(b.steady_s[0]);
-    let shorter = (a.steady_s[1] - a.steady_s[0]).min(b.steady_s[1] - b.steady_s[0]);
-    let names = |cut: &CutAnalysis| -> Vec<String> { cut.channels.iter().map(|c| c.name.clone()).collect() };
-    same_file && both > 0.5 * shorter && names(a) == names(b)
-}
-
 /// The same record twice would count double; a repeated cut is welcome.
 fn without_duplicates<'a>(
     trials: &CuttingTrials,
@@ -199,7 +189,7 @@ fn without_duplicates<'a>(
     let mut kept: Vec<&CutAnalysis> = Vec::new();
     for cut in cuts {
         let same_data = |a: &CutAnalysis| {
-            is_same_stretch(trials, a, cut)
+            (trials.cuts[a.cut].file == trials.cuts[cut.cut].file && a.is_same_stretch(cut))
                 || (a.averages == cut.averages
                     && a.steady_s == cut.steady_s
                     && a.spindle_rpm == cut.spindle_rpm)

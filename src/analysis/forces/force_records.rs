@@ -102,22 +102,21 @@ pub struct Copied {
 }
 
 /// Records that several files hold.
-fn copies(cuts: &[Cut], digests: &[Option<Digest>], waveforms: &[Result<Waveform>]) -> Vec<Copied> {
-    let is_at_odds = |i: usize| {
-        let notices = waveforms[i].as_ref().map_or(&[][..], |w| &w.1);
-        notices.iter().any(contradicts_speed)
-    };
+fn copies(cuts: &[Cut], digests: &[Option<Digest>], averages: &[Result<CutAnalysis>]) -> Vec<Copied> {
     let mut found: Vec<Copied> = Vec::new();
-    for b in 0..cuts.len() {
-        let same = |&a: &usize| {
-            digests[a].is_some()
-                && digests[a] == digests[b]
+    for (b, second) in averages.iter().enumerate() {
+        let Ok(second) = second else { continue };
+        let first = averages[..b].iter().enumerate().find_map(|(a, first)| {
+            let first = first.as_ref().ok()?;
+            let is_copy = digests[a] == digests[b]
                 && cuts[a].file != cuts[b].file
-                && !found.iter().any(|f| f.not_of == Some(a))
-        };
-        let Some(a) = (0..b).find(same) else { continue };
+                && first.is_same_stretch(second)
+                && !found.iter().any(|f| f.not_of == Some(a));
+            is_copy.then_some((a, first))
+        });
+        let Some((a, first)) = first else { continue };
         let alike = cuts[a].geometry == cuts[b].geometry && cuts[a].spindle_rpm == cuts[b].spindle_rpm;
-        let not_of = match [is_at_odds(a), is_at_odds(b)] {
+        let not_of = match [first, second].map(|cut| cut.notices.iter().any(contradicts_speed)) {
             [true, false] => Some(a),
             [false, true] => Some(b),
             _ => alike.then_some(b),
@@ -162,7 +161,7 @@ impl ForceRecords {
             digests.push(digest);
         }
         campaign.records_were_read(&digests);
-        let copies = copies(&plain.cuts, &digests, &waveforms);
+        let copies = copies(&plain.cuts, &digests, &averages);
         for Copied { cuts: both, not_of } in &copies {
             for cut in both.iter().filter(|cut| not_of.is_none_or(|one| one == **cut)) {
                 let other = both[usize::from(both[0] == *cut)];

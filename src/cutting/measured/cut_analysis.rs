@@ -92,6 +92,18 @@ pub struct CutAnalysis {
     pub notices: Vec<Notice>,
 }
 
+impl CutAnalysis {
+    /// Whether two cuts in one record are the same samples. A record may hold several: one after the other (`steady_s`), or each in
+    /// channels of its own.
+    pub fn is_same_stretch(&self, other: &CutAnalysis) -> bool {
+        let both = self.steady_s[1].min(other.steady_s[1]) - self.steady_s[0].max(other.steady_s[0]);
+        let shorter = (self.steady_s[1] - self.steady_s[0]).min(other.steady_s[1] - other.steady_s[0]);
+        let names =
+            |cut: &CutAnalysis| -> Vec<String> { cut.channels.iter().map(|c| c.name.clone()).collect() };
+        both > 0.5 * shorter && names(self) == names(other)
+    }
+}
+
 /// The mean of one channel over a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnAverage {

@@ -8,7 +8,7 @@ use crate::cutting::measured::cut_analysis::{CutAnalysis, Notice};
 use crate::data::{Sample, TimeRecord};
 use crate::signal::{self, median};
 
-pub(crate) const JUMPED: &str = "the zero jumped within the cut and is put right from there on: look for an amplifier that overloaded \
+const JUMPED: &str = "the zero jumped within the cut and is put right from there on: look for an amplifier that overloaded \
      or was reset, and choose a larger range";
 
 /// Turns before and after a jump whose means are held against one another.

@@ -26,6 +26,19 @@ pub struct SetupFinding {
 pub const LIKELY: f64 = 0.5;
 
 impl SetupFinding {
+    /// One that has no size: an exchange, a wrong name.
+    pub(super) fn without_size(kind: &'static str, place: String, confidence: f64, remedy: String) -> Self {
+        SetupFinding {
+            kind,
+            place,
+            value: None,
+            std_error: None,
+            unit: "",
+            confidence,
+            remedy,
+        }
+    }
+
     /// Whether it is put first and keeps other verdicts from being certain.
     pub fn is_likely(&self) -> bool {
         self.confidence >= LIKELY

@@ -1,5 +1,7 @@
 //! Which FRFs a mistake concerns.
 
+use std::sync::Arc;
+
 use crate::data::{Axis, Point};
 use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
@@ -31,6 +33,18 @@ impl FrfGroup {
             && self.response_point.is_none_or(|p| p == frf.response.point)
             && self.response_axis.is_none_or(|a| a == frf.response.axis)
             && self.reference_axis.is_none_or(|a| a == frf.reference.axis)
+    }
+
+    /// The data with a change (of an FRF, measured at these frequencies, Hz) made to every FRF of the group.
+    pub fn changed(&self, data: &FrfData, change: impl Fn(&[f64], &mut FrfDatum)) -> FrfData {
+        let mut data = data.clone();
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            for frf in block.frfs.iter_mut().filter(|f| self.holds(f)) {
+                change(&block.frequency_hz, frf);
+            }
+        }
+        data
     }
 
     /// Whether every FRF of `other` is one of this group.

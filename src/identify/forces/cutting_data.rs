@@ -442,15 +442,12 @@ impl CuttingData {
     /// The same records, the milled cuts for which `turned` holds (by index into [`CuttingData::cuts`]) with their immersion seen
     /// from the other side: up milling for down milling.
     pub fn milled_the_other_way(&self, turned: impl Fn(usize) -> bool) -> Self {
-        let mut own = self.clone();
-        for (_, cut) in own.cuts.iter_mut().enumerate().filter(|(i, _)| turned(*i)) {
-            let cut = Arc::make_mut(cut);
-            if let CutKind::Milling { cut: milling, unit } = &mut cut.kind {
-                milling.immersion = milling.immersion.mirrored();
-                **unit = milling.linear(cut.orders);
-            }
-        }
-        own
+        self.milled_otherwise(turned, |milling| {
+            Some(MillingCut {
+                immersion: milling.immersion.mirrored(),
+                ..milling.clone()
+            })
+        })
     }
 
     /// One cut milled or drilled with `factor` times the stated feed.

@@ -169,35 +169,32 @@ impl RecordChange {
     }
 
     pub(super) fn tried(&self, data: &CuttingData, base: f64) -> Option<TriedMistake> {
+        let values = data.value_count() as f64;
         let (value, std, chi2) = match self {
+            // Neither has a size.
             RecordChange::Gain(gain) if gain.is_dead => {
                 let rest = gain.left_out(data)?;
-                let noise = (data.value_count() - rest.value_count()) as f64;
-                // A value other than none, which would mean that nothing was found.
-                (
-                    1.0,
-                    0.0,
-                    fit(&rest)?.reduced_chi2 * rest.value_count() as f64 + noise,
-                )
+                let kept = rest.value_count() as f64;
+                (0.0, 0.0, fit(&rest)?.reduced_chi2 * kept + values - kept)
             }
-            RecordChange::Exchanged(_) => {
-                let left = fit(&self.undone(data, 0.0))?.reduced_chi2;
-                (1.0, 0.0, left * data.value_count() as f64)
-            }
+            RecordChange::Exchanged(_) => (0.0, 0.0, fit(&self.undone(data, 0.0))?.reduced_chi2 * values),
             _ => self.best(data)?,
         };
-        let is_better = chi2 < base;
         let is_slip = match self {
             RecordChange::FeedOf(_)
             | RecordChange::DepthOf(_)
             | RecordChange::Width(_)
             | RecordChange::Helix => value.abs() >= LEAST_SLIP,
-            _ => value != 0.0,
+            RecordChange::Exchanged(_) | RecordChange::Gain(_) => true,
+            RecordChange::GainOfY | RecordChange::SpeedWander { .. } | RecordChange::LowPass { .. } => {
+                value != 0.0
+            }
         };
+        let is_better = chi2 < base;
         if !is_better || !is_slip {
             return None;
         }
-        let std = std * (chi2 / data.value_count() as f64).max(1.0).sqrt();
+        let std = std * (chi2 / values).max(1.0).sqrt();
         let finding = match self {
             RecordChange::Width(Some(cut)) => {
                 other_than_stated(&data.cuts[*cut].id, "radial-width", "radial width", value, std)
@@ -218,21 +215,11 @@ impl RecordChange {
                 value,
                 std,
             ),
-            RecordChange::Exchanged(cuts) => {
-                let ids = cuts.map(|i| data.cuts[i].id.clone());
-                SetupFinding {
-                    kind: "cut-swap",
-                    place: format!("cut {}", listed(&ids)),
-                    value: None,
-                    std_error: None,
-                    unit: "",
-                    confidence: 0.0,
-                    remedy: format!(
-                        "Swap the files of cut {}: each record has the forces that the other cut asks for.",
-                        listed(&ids)
-                    ),
-                }
-            }
+            RecordChange::Exchanged(cuts) => exchanged_files(
+                &cuts.map(|i| data.cuts[i].id.clone()),
+                "each record has the forces that the other cut asks for",
+                0.0,
+            ),
             RecordChange::Gain(gain) => gain.finding(data, value, std),
             RecordChange::FeedOf(cut) => {
                 other_than_stated(&data.cuts[*cut].id, "feed-override", "feed", value, std)
@@ -311,6 +298,13 @@ impl RecordChange {
             at_bound: false,
         })
     }
+}
+
+/// The files of two cuts that stand under each other's name; `why`: what says so.
+pub(super) fn exchanged_files(cuts: &[String; 2], why: &str, confidence: f64) -> SetupFinding {
+    let cuts = listed(cuts);
+    let remedy = format!("Swap the files of cut {cuts}: {why}.");
+    SetupFinding::without_size("cut-swap", format!("cut {cuts}"), confidence, remedy)
 }
 
 /// All cuts made otherwise than stated, by a factor on `what` whose logarithm is `value`; `truth`: what that comes to.

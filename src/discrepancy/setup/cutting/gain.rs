@@ -89,45 +89,28 @@ impl OtherGain {
             true => format!("cut {}", listed(&ids)),
             false => format!("cut {}, {what}", listed(&ids)),
         };
-        let unit = |of: f64| (factor.abs() / of).ln().abs() < DEVIATES;
         let (kind, told) = if self.is_dead {
-            (
-                "dead-channel",
-                format!(
-                    "{what} shows none of the force that the other channels and cuts ask for: look at its cable, plug and amplifier, and \
-                     leave this channel of cut {} out (or the cut).",
-                    listed(&ids)
-                ),
-            )
+            let told = format!(
+                "{what} shows none of the force that the other channels and cuts ask for: look at its cable, plug and amplifier, and leave \
+                 this channel of cut {} out (or the cut).",
+                listed(&ids)
+            );
+            ("dead-channel", told)
         } else {
-            let because = if (factor + 1.0).abs() < ALIKE {
-                "as if a plug, the polarity or an axis were turned round between the cuts".to_string()
-            } else if unit(1e-3) {
-                "as if these files were in kN and the others in N".into()
-            } else if unit(1e3) {
-                "as if these files were in N and the others in kN".into()
-            } else if unit(4.448_221_615) || unit(1.0 / 4.448_221_615) {
-                "as if pounds-force and newtons were mixed".into()
-            } else {
-                "as if a range or sensitivity of the amplifier had been switched".into()
-            };
-            let kind = if (factor + 1.0).abs() < ALIKE {
-                "channel-sign"
-            } else {
-                "channel-gain"
-            };
-            (
-                kind,
-                format!(
-                    "Recorded is {} times what the other cuts ask for, {because}. Find out which of the two is right; for each of these cuts \
-                     a [[channel]] with `cut`, `name` and `{}` puts it right.",
-                    with_error(factor, error),
-                    match kind {
-                        "channel-sign" => "sign = -1".to_string(),
-                        _ => format!("gain_n_per_unit = {}", figures(1.0 / factor, 4)),
-                    }
+            let (kind, key) = match is_turned_round(factor) {
+                true => ("channel-sign", "sign = -1".to_string()),
+                false => (
+                    "channel-gain",
+                    format!("gain_n_per_unit = {}", figures(1.0 / factor, 4)),
                 ),
-            )
+            };
+            let told = format!(
+                "Recorded is {} times what the other cuts ask for, {}. Find out which of the two is right; for each of these cuts a \
+                 [[channel]] with `cut`, `name` and `{key}` puts it right.",
+                with_error(factor, error),
+                looks_like(factor)
+            );
+            (kind, told)
         };
         SetupFinding {
             kind,
@@ -138,6 +121,27 @@ impl OtherGain {
             confidence: 0.0,
             remedy: told,
         }
+    }
+}
+
+fn is_turned_round(factor: f64) -> bool {
+    (factor + 1.0).abs() < ALIKE
+}
+
+/// What makes records so many times too large.
+fn looks_like(factor: f64) -> &'static str {
+    const NEWTONS_PER_POUND: f64 = 4.448_221_615;
+    let is = |of: f64| (factor.abs() / of).ln().abs() < DEVIATES;
+    if is_turned_round(factor) {
+        "as if a plug, the polarity or an axis were turned round between the cuts"
+    } else if is(1e-3) {
+        "as if these files were in kN and the others in N"
+    } else if is(1e3) {
+        "as if these files were in N and the others in kN"
+    } else if is(NEWTONS_PER_POUND) || is(1.0 / NEWTONS_PER_POUND) {
+        "as if pounds-force and newtons were mixed"
+    } else {
+        "as if a range or sensitivity of the amplifier had been switched"
     }
 }
 
@@ -337,14 +341,7 @@ pub(super) fn other_gains(
 mod tests {
     use super::*;
     use crate::discrepancy::setup::examine_cutting;
-    use crate::identify::forces::made_cuts::{METAL, milled};
-
-    /// Ten slots and half slots of five feeds, of a metal so hard that errors of 1 N hide nothing.
-    fn made() -> CuttingData {
-        let ways = [0.05, 0.08, 0.1, 0.15, 0.2]
-            .map(|feed| [[feed, 1.0, 0.0, 180.0, 0.4], [feed, 2.0, 90.0, 180.0, -0.7]]);
-        milled(METAL.map(|k| 10.0 * k), &ways.concat())
-    }
+    use crate::identify::forces::made_cuts::ten_hard_cuts;
 
     fn found(data: &CuttingData, case: &str) -> SetupFinding {
         let findings = examine_cutting(data, || None).unwrap().findings;
@@ -353,7 +350,7 @@ mod tests {
 
     #[test]
     fn some_records_with_another_gain_are_named_with_it() {
-        let made = made();
+        let made = ten_hard_cuts();
         assert_eq!(examine_cutting(&made, || None).unwrap().findings, []);
         let all: [(&[usize], Option<usize>, f64, &str); 7] = [
             (&[3], None, 0.01, "channel-gain"),
@@ -390,7 +387,7 @@ mod tests {
 
     #[test]
     fn a_channel_without_its_force_is_named() {
-        let mut made = made();
+        let mut made = ten_hard_cuts();
         let cut = Arc::make_mut(&mut made.cuts[4]);
         let channel = cut.channels[1].as_mut().unwrap();
         channel.orders.iter_mut().for_each(|line| *line *= 0.0);

@@ -22,7 +22,7 @@ use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, 
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 use crate::signal::SpindleTrack;
 use crate::text::listed;
-use change::{RecordChange, SPEED_VARIATION};
+use change::{RecordChange, SPEED_VARIATION, exchanged_files};
 use direction::milling_direction;
 use gain::other_gains;
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
@@ -34,6 +34,8 @@ const CUTS: usize = 4;
 const FEWEST_CUTS: usize = 4;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
+/// Confidence in what was read off the records themselves.
+const CERTAIN: f64 = 0.97;
 
 /// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels. Last what was taken out
 /// while the records were read.
@@ -45,7 +47,17 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         true => examine(data, rival)?,
         // At speeds that are not theirs the waveforms of these cuts are none.
         false => SetupCheck {
-            findings: data.exchanged.iter().map(exchanged_files).collect(),
+            findings: data
+                .exchanged
+                .iter()
+                .map(|cuts| {
+                    exchanged_files(
+                        cuts,
+                        "each ran at the spindle speed stated for the other",
+                        CERTAIN,
+                    )
+                })
+                .collect(),
             reduced_chi2: 1.0,
             explained_share: 1.0,
             ..SetupCheck::default()
@@ -62,39 +74,21 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
     Ok(check)
 }
 
-fn exchanged_files(cuts: &[String; 2]) -> SetupFinding {
-    SetupFinding {
-        kind: "cut-swap",
-        place: format!("cut {}", listed(cuts)),
-        value: None,
-        std_error: None,
-        unit: "",
-        confidence: 0.97,
-        remedy: format!(
-            "Swap the files of cut {}: each ran at the spindle speed stated for the other.",
-            listed(cuts)
-        ),
-    }
-}
-
 /// Two cuts under which one record was filed; it counts once at most.
 fn copied_record((cuts, not_of): &([String; 2], Option<String>)) -> SetupFinding {
     let what = match not_of {
         Some(id) => format!("cut {id} is left out"),
         None => "both are left out".into(),
     };
-    SetupFinding {
-        kind: "duplicates",
-        place: format!("cut {}", listed(cuts)),
-        value: None,
-        std_error: None,
-        unit: "",
-        confidence: 0.97,
-        remedy: format!(
+    SetupFinding::without_size(
+        "duplicates",
+        format!("cut {}", listed(cuts)),
+        CERTAIN,
+        format!(
             "Both files hold the same record, sample for sample ({what}): export the record of the other cut again, or take it out of \
              campaign.toml."
         ),
-    }
+    )
 }
 
 /// A speed that wanders or droops, as the records were put in step for it.
@@ -121,7 +115,7 @@ fn speed_variation(data: &CuttingData) -> Option<SetupFinding> {
         value: Some(worst.varying_rad()),
         std_error: Some(worst.varying_rad() * std / relative),
         unit: "rad",
-        confidence: 0.97,
+        confidence: CERTAIN,
         remedy: format!(
             "Look why the speed changes under load (it varies by {} %, rms): the tool is early or late by so much (rms). Averages and \
              waveforms are put in step by the angle that the forces show, so that coefficients and verdict do not suffer from it.",
@@ -367,7 +361,7 @@ fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChan
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::forces::made_cuts::{METAL, drilled, milled};
+    use crate::identify::forces::made_cuts::{METAL, drilled, milled, ten_hard_cuts};
 
     #[test]
     fn a_cut_that_was_not_made_as_the_list_says_is_named_with_what_it_was_made_with() {
@@ -396,13 +390,6 @@ mod tests {
         }
     }
 
-    /// Ten cuts, slots and half slots, of a metal ten times as hard.
-    fn ten_cuts() -> CuttingData {
-        let ways = [0.05, 0.08, 0.1, 0.15, 0.2]
-            .map(|feed| [[feed, 1.0, 0.0, 180.0, 0.4], [feed, 2.0, 90.0, 180.0, -0.7]]);
-        milled(METAL.map(|k| 10.0 * k), &ways.concat())
-    }
-
     fn first(listed: &CuttingData) -> SetupFinding {
         let findings = examine_cutting(listed, || None).unwrap().findings;
         let first = findings.into_iter().next().expect("a finding");
@@ -412,7 +399,7 @@ mod tests {
 
     #[test]
     fn a_wrong_width_is_named_with_the_true_one() {
-        let made = ten_cuts();
+        let made = ten_hard_cuts();
         for factor in [0.8, 1.25] {
             let cases = [
                 (
@@ -436,7 +423,7 @@ mod tests {
 
     #[test]
     fn two_records_under_each_others_name_are_named() {
-        let made = ten_cuts();
+        let made = ten_hard_cuts();
         let found = first(&made.with_exchanged([2, 8]));
         assert_eq!(
             (found.kind, found.place.as_str(), found.value),

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use super::super::finding::SetupFinding;
 use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
@@ -15,14 +13,7 @@ pub struct ChannelSign {
 
 impl FileReading for ChannelSign {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            let block = Arc::make_mut(block);
-            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
-                frf.sign = -frf.sign;
-            }
-        }
-        data
+        self.group.changed(data, |_, frf| frf.sign = -frf.sign)
     }
 
     fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
 use super::super::finding::SetupFinding;
@@ -20,14 +18,7 @@ pub struct DeadChannel {
 
 impl FileReading for DeadChannel {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            let block = Arc::make_mut(block);
-            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
-                frf.sign = 0.0;
-            }
-        }
-        data
+        self.group.changed(data, |_, frf| frf.sign = 0.0)
     }
 
     fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {

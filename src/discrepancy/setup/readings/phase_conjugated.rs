@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use super::super::finding::SetupFinding;
 use super::super::group::FrfGroup;
 use super::super::reading::FileReading;
@@ -15,16 +13,11 @@ pub struct PhaseConjugated {
 
 impl FileReading for PhaseConjugated {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            let block = Arc::make_mut(block);
-            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
-                for h in &mut frf.receptance {
-                    *h = h.conj();
-                }
+        self.group.changed(data, |_, frf| {
+            for h in &mut frf.receptance {
+                *h = h.conj();
             }
-        }
-        data
+        })
     }
 
     fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {

@@ -1,5 +1,3 @@
-use std::sync::Arc;
-
 use num_complex::Complex64;
 
 use super::super::finding::SetupFinding;
@@ -25,19 +23,14 @@ fn factor(frequency_hz: f64, power: i32) -> Complex64 {
 
 impl FileReading for MisreadQuantity {
     fn corrected(&self, data: &FrfData) -> FrfData {
-        let mut data = data.clone();
-        for block in &mut data.blocks {
-            let block = Arc::make_mut(block);
-            for frf in block.frfs.iter_mut().filter(|f| self.group.holds(f)) {
-                let lines = block.frequency_hz.iter();
-                for ((f, h), std) in lines.zip(&mut frf.receptance).zip(&mut frf.noise_std) {
-                    let factor = factor(*f, self.power);
-                    *h /= factor;
-                    *std /= factor.norm();
-                }
+        self.group.changed(data, |frequency_hz, frf| {
+            let lines = frequency_hz.iter();
+            for ((f, h), std) in lines.zip(&mut frf.receptance).zip(&mut frf.noise_std) {
+                let factor = factor(*f, self.power);
+                *h /= factor;
+                *std /= factor.norm();
             }
-        }
-        data
+        })
     }
 
     fn finding(&self, data: &FrfData, points: &[Point]) -> SetupFinding {

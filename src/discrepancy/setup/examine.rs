@@ -5,14 +5,13 @@ use std::borrow::Cow;
 use rayon::prelude::*;
 
 use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
-use super::duplicates::duplicates;
 use super::finding::SetupFinding;
 use super::fit::JointProblem;
 use super::group::FrfGroup;
-use super::mistake::{Estimated, Mistake};
+use super::mistake::{Estimated, Mistake, Score};
 use super::reading::{FileReading, model_read};
-use super::score::{Linearised, Score};
-use super::{mistakes, readings, slips};
+use super::score::Linearised;
+use super::{mistakes, numbers, readings, slips};
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
@@ -126,7 +125,7 @@ pub fn examine(
     rival: impl FnOnce() -> Option<Rival>,
 ) -> Result<SetupCheck> {
     let mut check = SetupCheck {
-        findings: duplicates(data, &model.points),
+        findings: numbers::without_model(data, &model.points),
         ..SetupCheck::default()
     };
     let whole = data;
@@ -272,7 +271,8 @@ fn most_promising<'t>(
 ) -> Result<Vec<(&'t [f64], usize, Score)>> {
     let here = Linearised::new(model, thin, start)?;
     let mut scored = Vec::new();
-    for (index, mistake) in all.iter().enumerate() {
+    let small = all.iter().enumerate().filter(|(_, m)| m.is_ever_small());
+    for (index, mistake) in small {
         let price = 8.0 * mistake.sizes().len() as f64;
         let mut scores = here.scores(mistake.as_ref())?;
         scores.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -280,7 +280,12 @@ fn most_promising<'t>(
     }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let promising = scored.into_iter().filter(|s| s.0 > LEAST_GAIN).take(most);
-    Ok(promising.map(|(_, index, score)| (start, index, score)).collect())
+    let mut promising: Vec<_> = promising.map(|(_, index, score)| (start, index, score)).collect();
+    for (index, mistake) in all.iter().enumerate() {
+        let far = mistake.far(model, thin, start)?;
+        promising.extend(far.into_iter().map(|score| (start, index, score)));
+    }
+    Ok(promising)
 }
 
 fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec<readings::Proposed>> {

@@ -5,7 +5,9 @@ use num_complex::Complex64;
 use super::finding::SetupFinding;
 use super::group::FrfGroup;
 use super::truth::Truth;
+use crate::Result;
 use crate::data::{Axis, Point};
+use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 use crate::robot::Kinematics;
 
@@ -31,6 +33,15 @@ impl MistakeSize {
             bounds: [0.0, most],
         }
     }
+}
+
+/// A mistake's linear estimate for one group.
+#[derive(Debug, Clone)]
+pub struct Score {
+    pub group: FrfGroup,
+    /// Decrease of χ² that it promises.
+    pub gain: f64,
+    pub values: Vec<f64>,
 }
 
 /// What was estimated of a mistake.
@@ -85,6 +96,11 @@ pub trait Distortion: Sync + Send {
         0.0
     }
 
+    /// True frequency over that of the file.
+    fn frequency_ratio(&self, _values: &[f64]) -> f64 {
+        1.0
+    }
+
     /// The forces whose responses [`Self::shown`] asks for.
     fn forces(&self) -> Pushed {
         Pushed::AtHit
@@ -106,6 +122,19 @@ pub trait Mistake: Distortion {
 
     /// Makes of what a linear estimate gives what large mistakes really are; small ones stay.
     fn beyond_the_first_order(&self, _values: &mut [f64]) {}
+
+    /// Whether it occurs so small that a linear estimate finds it.
+    fn is_ever_small(&self) -> bool {
+        true
+    }
+
+    /// Sizes too large for a linear estimate, found by trying; `gain` is then no χ².
+    ///
+    /// # Errors
+    /// A model without a response.
+    fn far(&self, _model: &StructureModel, _data: &FrfData, _theta: &[f64]) -> Result<Vec<Score>> {
+        Ok(Vec::new())
+    }
 
     /// The finding, its confidence still open.
     fn finding(&self, estimated: &Estimated) -> SetupFinding;

@@ -9,13 +9,13 @@
 mod care;
 mod cutting;
 mod decide;
-mod duplicates;
 mod examine;
 mod finding;
 mod fit;
 mod group;
 mod mistake;
 mod mistakes;
+mod numbers;
 mod reading;
 mod readings;
 mod scene;

@@ -165,7 +165,8 @@ fn pass(
     pushed.sort_unstable();
     pushed.dedup();
     let decay = made.map_or(0.0, |m| m.mistake.decay_per_s(m.values));
-    let rates: Vec<Complex64> = block.rates().into_iter().map(|s| s + decay).collect();
+    let ratio = made.map_or(1.0, |m| m.mistake.frequency_ratio(m.values));
+    let rates: Vec<Complex64> = block.rates().into_iter().map(|s| s * ratio + decay).collect();
     basis.solve_lines(&rates, &pushed, |line, response| {
         for (&k, first) in members.iter().zip(&firsts) {
             let truth = Truth {

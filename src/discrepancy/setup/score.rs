@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::group::FrfGroup;
-use super::mistake::{Mistake, MistakeSize};
+use super::mistake::{Mistake, MistakeSize, Score};
 use super::scene::{Curves, Made, predict, weighted};
 use crate::Result;
 use crate::identify::StructureModel;
@@ -24,15 +24,6 @@ pub struct Linearised<'a> {
     gradient: DVector<f64>,
     /// Where the values of each FRF stand.
     ranges: Vec<std::ops::Range<usize>>,
-}
-
-/// A mistake's linear estimate for one group.
-#[derive(Debug, Clone)]
-pub struct Score {
-    pub group: FrfGroup,
-    /// Decrease of χ² that it promises.
-    pub gain: f64,
-    pub values: Vec<f64>,
 }
 
 /// Steps of differences, in units of a parameter's prior standard deviation or usual size.

@@ -249,8 +249,10 @@ fn wrong_readings_are_found() {
     let mut twice = data.clone();
     let mut again = data.blocks[0].as_ref().clone();
     again.posture = 1;
+    // Measured another time: not the same numbers.
     for frf in &mut again.frfs {
         frf.posture = 1;
+        frf.receptance.iter_mut().for_each(|h| *h *= 1.0 + 1e-6);
     }
     twice.blocks.push(Arc::new(again));
     let found = check_of(&twice).expect("duplicates");
@@ -299,6 +301,121 @@ fn other_conventions_and_units_are_found() {
     assert_eq!(found.kind, "channel-gain");
     assert!((found.value.unwrap() / 1e3 - 1.0).abs() < 0.01, "{found:?}");
     assert!(found.remedy.contains("mm called m"), "{}", found.remedy);
+}
+
+/// Another sampling rate than was written down, at one posture: accelerance on frequencies that are too low.
+#[test]
+fn another_frequency_axis_is_found_with_its_ratio() {
+    let model = model();
+    for (seed, ratio) in [(6, 1.28), (7, 0.5)] {
+        let mut data = measured(&model, None, seed);
+        let block = Arc::make_mut(&mut data.blocks[2]);
+        block.frequency_hz.iter_mut().for_each(|f| *f /= ratio);
+        for frf in &mut block.frfs {
+            frf.receptance.iter_mut().for_each(|h| *h *= ratio * ratio);
+            frf.noise_std.iter_mut().for_each(|std| *std *= ratio * ratio);
+        }
+        let check = check(&model, &data);
+        let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
+        assert_eq!(
+            (found.kind, found.place.as_str()),
+            ("frequency-axis", "posture c")
+        );
+        let (value, error) = (found.value.unwrap(), found.std_error.unwrap());
+        assert!((value - ratio).abs() < 4.0 * error && error < 1e-3, "{found:?}");
+    }
+}
+
+/// The numbers of one posture in another order, with the point elsewhere; no single joint that is off explains them.
+#[test]
+fn mistyped_angles_are_found() {
+    let model = model();
+    let data = measured(&model, None, 5);
+    let typed = |turns: &dyn Fn(&[f64]) -> Vec<(usize, f64)>| {
+        let mut data = data.clone();
+        let block = Arc::make_mut(&mut data.blocks[2]);
+        let angles_rad = block.kinematics.joint_angles_rad(&model.robot.spec);
+        for (joint, turn) in turns(&angles_rad) {
+            block.kinematics = block.kinematics.turned(joint, turn);
+        }
+        let check = check(&model, &data);
+        let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
+        (found.kind, found.place.clone(), found.value)
+    };
+    let exchanged = typed(&|q| vec![(2, q[2] - q[1]), (3, q[1] - q[2])]);
+    assert_eq!(
+        exchanged,
+        ("joint-angles", "joints 2 and 3, posture c".into(), None)
+    );
+    let (kind, place, value) = typed(&|q| vec![(1, -0.9 * q[0])]);
+    assert_eq!((kind, place.as_str()), ("encoder-offset", "joint 1, posture c"));
+    let right = data.blocks[2].kinematics.joint_angles_rad(&model.robot.spec)[0];
+    assert!(
+        (value.unwrap() - 0.9 * right.to_degrees()).abs() < 0.1,
+        "{value:?}"
+    );
+}
+
+/// Apparent mass where accelerance is expected: both hold two derivatives.
+#[test]
+fn force_per_motion_is_found() {
+    let model = model();
+    let mut data = measured(&model, None, 5);
+    let block = Arc::make_mut(&mut data.blocks[1]);
+    let omega = block.frequency_hz.iter().map(|f| std::f64::consts::TAU * f);
+    let omega: Vec<f64> = omega.collect();
+    for frf in &mut block.frfs {
+        for ((h, std), w) in frf.receptance.iter_mut().zip(&mut frf.noise_std).zip(&omega) {
+            let read = (*h * w.powi(4)).finv();
+            *std *= read.norm() / h.norm();
+            *h = read;
+        }
+    }
+    let check = check(&model, &data);
+    let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
+    assert_eq!((found.kind, found.place.as_str()), ("quantity", "posture b"));
+    assert!(found.remedy.contains("force per motion"), "{}", found.remedy);
+}
+
+/// The same numbers for two directions or two postures, and magnitudes alone, need no model to be seen; a reciprocal pair may be alike.
+#[test]
+fn copies_and_magnitudes_are_found() {
+    let model = model();
+    let data = measured(&model, None, 5);
+    let points = &model.points;
+    let receptance = |block: usize, response: usize, reference: Axis| {
+        let frf = data.blocks[block].frfs.iter().find(|f| {
+            (f.response.point, f.response.axis, f.reference.axis) == (0, Axis::ALL[response], reference)
+        });
+        frf.unwrap().receptance.clone()
+    };
+    let told = |block: usize, response: usize, reference: Axis, with: Vec<Complex64>| {
+        let mut data = data.clone();
+        let frfs = &mut Arc::make_mut(&mut data.blocks[block]).frfs;
+        let frf = frfs.iter_mut().find(|f| {
+            (f.response.point, f.response.axis, f.reference.axis) == (0, Axis::ALL[response], reference)
+        });
+        frf.unwrap().receptance = with;
+        let told = numbers::without_model(&data, points);
+        told.into_iter().map(|f| (f.kind, f.place)).collect::<Vec<_>>()
+    };
+    assert_eq!(numbers::without_model(&data, points), []);
+    let directions = told(1, 2, Axis::X, receptance(1, 0, Axis::X));
+    assert_eq!(
+        directions,
+        [("duplicates", "posture b: 1X/1X and 1Z/1X".to_string())]
+    );
+    let postures = told(3, 0, Axis::X, receptance(1, 0, Axis::X));
+    assert_eq!(postures, [("duplicates", "postures b and d: 1X/1X".to_string())]);
+    assert_eq!(told(1, 2, Axis::X, receptance(1, 0, Axis::Z)), []);
+    let magnitudes = receptance(1, 0, Axis::X)
+        .iter()
+        .map(|h| Complex64::from(-h.norm()))
+        .collect();
+    assert_eq!(
+        told(1, 0, Axis::X, magnitudes),
+        [("phase-missing", "posture b".to_string())]
+    );
 }
 
 /// Hits that were off at one posture are what every laboratory has, and are taken; what is the same in all files is not.

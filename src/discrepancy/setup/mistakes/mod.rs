@@ -4,6 +4,7 @@ mod amplifier_low_pass;
 pub(super) mod channel_gain;
 pub(super) mod encoder_offset;
 mod exponential_window;
+mod frequency_axis;
 pub(super) mod hit_direction;
 mod late_channel;
 mod point_position;
@@ -41,5 +42,8 @@ pub fn all(model: &StructureModel, data: &FrfData) -> Vec<Box<dyn Mistake>> {
     }
     all.push(Box::new(sensor_mass::SensorMass));
     all.push(Box::new(late_channel::LateChannel));
+    for power in [2, 1, 0] {
+        all.push(Box::new(frequency_axis::FrequencyAxis { power }));
+    }
     all
 }

@@ -4,6 +4,7 @@ mod axes;
 mod channel_sign;
 mod dead_channel;
 mod joint_convention;
+mod mistyped_angles;
 mod phase_conjugated;
 mod point_frame;
 mod point_swap;
@@ -11,8 +12,10 @@ mod posture_swap;
 mod promising;
 mod proposal;
 mod quantity;
+mod reciprocal;
 mod table;
 
 pub use axes::Turn;
 pub use promising::proposed;
 pub use proposal::Proposed;
+pub use table::distance;

@@ -3,8 +3,8 @@
 use super::proposal::Proposed;
 use super::table::DistanceTable;
 use super::{
-    axes, channel_sign, dead_channel, joint_convention, phase_conjugated, point_frame, point_swap,
-    posture_swap, quantity,
+    axes, channel_sign, dead_channel, joint_convention, mistyped_angles, phase_conjugated, point_frame,
+    point_swap, posture_swap, quantity, reciprocal,
 };
 use crate::Result;
 use crate::identify::StructureModel;
@@ -37,9 +37,11 @@ pub fn proposed(
         here.extend(dead_channel::proposed(&table, data));
         here.extend(phase_conjugated::proposed(&table, data));
         here.extend(quantity::proposed(&table, data));
+        here.extend(reciprocal::proposed(&table, data));
         here.extend(point_frame::proposed(&table, model, data, theta)?);
         here.extend(point_swap::proposed(&table, model, data, theta)?);
         here.extend(joint_convention::proposed(&table, model, data, theta)?);
+        here.extend(mistyped_angles::proposed(&table, model, data, theta)?);
         here.extend(posture_swap::proposed(&table, model, data, theta)?);
         let disagreement: f64 = table.now.iter().sum();
         for proposed in &mut here {

@@ -17,7 +17,7 @@ pub struct MisreadQuantity {
 }
 
 /// (iω)^power at a frequency, SI.
-fn factor(frequency_hz: f64, power: i32) -> Complex64 {
+pub(super) fn factor(frequency_hz: f64, power: i32) -> Complex64 {
     Complex64::new(0.0, std::f64::consts::TAU * frequency_hz).powi(power)
 }
 

@@ -1,6 +1,6 @@
 //! The same FRF measured twice, and not the same.
 
-use super::finding::SetupFinding;
+use super::super::finding::SetupFinding;
 use crate::data::Point;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData, FrfDatum};
 
@@ -11,7 +11,7 @@ const SMALL: f64 = 0.05;
 
 /// Pairs of FRFs of the same posture, force level and degrees of freedom that contradict each other, one finding for each
 /// posture. `value` is the rms of the difference over the rms of the larger one.
-pub fn duplicates(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
+pub fn contradictions(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
     let all: Vec<(&FrfBlock, &FrfDatum)> = data.frfs().collect();
     let mut findings: Vec<(usize, f64, Vec<String>)> = Vec::new();
     for (i, (block, a)) in all.iter().enumerate() {

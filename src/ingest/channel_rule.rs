@@ -449,6 +449,8 @@ pub struct Timeless {
     pub forces: Vec<NamedForce>,
     /// The cuts, told apart by what stands beside Fx, Fy, Fz, Mz in the names of the channels (`Fx_R_1`, `Fy_R_1`: `R_1`).
     pub cuts: Vec<NamedCut>,
+    /// There are times, and they are of no use (not rising, not even).
+    pub useless_times: bool,
 }
 
 /// Looks for forces in a file that says neither times nor a sampling rate.
@@ -456,8 +458,9 @@ pub struct Timeless {
 /// # Errors
 /// The operating system's.
 pub fn timeless(path: &Path) -> Result<Timeless> {
-    let records = timeless_records(path)?;
+    let (records, useless_times) = timeless_records(path)?;
     Ok(Timeless {
+        useless_times,
         forces: forces_of(&records),
         cuts: cuts_of(&records),
     })
@@ -523,8 +526,9 @@ pub fn cuts_of(records: &[TimeRecord]) -> Vec<NamedCut> {
     cuts
 }
 
-/// The records of a file that says neither times nor a sampling rate, at any rate; empty where it says its times.
-fn timeless_records(path: &Path) -> Result<Vec<TimeRecord>> {
+/// The records of a file that says neither times nor a sampling rate, at any rate, and whether it has times of no use; empty where
+/// it says its times.
+fn timeless_records(path: &Path) -> Result<(Vec<TimeRecord>, bool)> {
     /// Any will do.
     const RATE_HZ: f64 = 1000.0;
     /// A shorter table is a list of results.
@@ -533,24 +537,25 @@ fn timeless_records(path: &Path) -> Result<Vec<TimeRecord>> {
     let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
     let mut notes = Notes::default();
     if read_bytes_at(&bytes, false, None, &mut notes).is_ok() {
-        return Ok(Vec::new());
+        return Ok((Vec::new(), false));
     }
+    let mut useless_times = false;
     let times = if is_binary(&bytes) {
         read_bytes_at(&bytes, false, Some(RATE_HZ), &mut notes).map(|(_, _, contents)| contents.times)
     } else {
         let text = &*without_byte_order_mark(&bytes);
         match Header::find(text).filter(|header| !header.names.is_empty()) {
             Some(mut header) => {
-                header.without_time();
+                useless_times = header.without_time();
                 header.lines.push(format!("Sampling rate [Hz]:,{RATE_HZ}"));
                 force::read(text, &header, &mut notes).map(|record| vec![record])
             }
-            None => return Ok(Vec::new()),
+            None => return Ok((Vec::new(), false)),
         }
     };
     let mut records = times.unwrap_or_default();
     records.retain(|record| record.len() >= SHORTEST);
-    Ok(records)
+    Ok((records, useless_times))
 }
 
 /// A table of text that has no names, or no time: columns are named as the rules name them.
@@ -777,7 +782,9 @@ mod tests {
         let mut x = rule(ChannelRole::ForceX, Source::Name("fx".into()));
         x.rate_hz = Some(500.0);
         assert_eq!(read_time_with(&path, &[x]).unwrap().record.sample_rate_hz, 500.0);
-        assert_eq!(forces("b.csv", useless.as_bytes()).0.len(), 2);
+        let (found, path) = forces("b.csv", useless.as_bytes());
+        assert_eq!(found.len(), 2);
+        assert!(timeless(&path).unwrap().useless_times);
         assert!(forces("c.csv", b"time_s,fx\n0,1\n1,2\n2,3\n3,4\n").0.is_empty());
         assert!(forces("d.csv", b"1,2\n2,1\n3,3\n4,3\n").0.is_empty());
     }

@@ -204,7 +204,12 @@ const SHOWN_CUTS: usize = 2;
 /// What to tell of a file that was not understood: where forces without times are all that is in it, which they are and the lines
 /// that say the rest; else `error`, as it is.
 fn without_times(path: &Path, error: InputError) -> InputError {
-    let cuts = ingest::timeless(path).unwrap_or_default().cuts;
+    let found = ingest::timeless(path).unwrap_or_default();
+    // What is wrong with times that are there says more than that a rate is missing.
+    if found.useless_times {
+        return error;
+    }
+    let cuts = found.cuts;
     let names = |cuts: &[ingest::NamedCut]| {
         let all: Vec<&str> = cuts
             .iter()

@@ -30,8 +30,9 @@ const TIME_WORDS: [&str; 8] = [
     "timestamp",
     "zeitstempel",
 ];
-const BEFORE_TIME: [&str; 8] = [
+const BEFORE_TIME: [&str; 9] = [
     "elapsed",
+    "x",
     "relative",
     "rel",
     "test",
@@ -548,6 +549,7 @@ mod tests {
             "Time (s)",
             "Zeit  1 - Standardmessrate [s]",
             "Elapsed Time (sec)",
+            "X_Time [s]",
             "时间(s)",
             "timestamp",
             "t_s",

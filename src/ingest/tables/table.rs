@@ -146,20 +146,23 @@ impl Header {
         })
     }
 
-    /// Takes their meaning from the columns of times: the sampling rate is to count.
-    pub fn without_time(&mut self) {
+    /// Takes their meaning from the columns of times: the sampling rate is to count. Whether there were any.
+    pub fn without_time(&mut self) -> bool {
+        let mut any = false;
         let is_time =
             |label: &String| units::parse(label).is_some_and(|u| u.dimension == units::Dimension::TIME);
         for (i, name) in self.names.iter_mut().enumerate() {
             let in_time = self.units.get(i).is_some_and(is_time)
                 || channel_names::unit_in_name(name).is_some_and(|u| u.dimension == units::Dimension::TIME);
             if channel_names::is_time(name) || i == 0 && in_time {
+                any = true;
                 *name = format!("unused {}", i + 1);
                 if let Some(unit) = self.units.get_mut(i) {
                     unit.clear();
                 }
             }
         }
+        any
     }
 
     /// `Key:,value` of a header line whose key contains one of `keys` (lower case); the unit of `Key [Hz]` is

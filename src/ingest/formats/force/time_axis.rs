@@ -76,7 +76,8 @@ pub(crate) fn time_axis(
                     grid: None,
                 })
             }
-            _ => Err(error.remedy("the time column must rise from row to row")),
+            _ => Err(error.remedy("the time column must rise from row to row; where the samples are even and the times are not to be trusted: give rate_hz in a \
+                                          [[channel]] of campaign.toml")),
         };
     }
     if !runs.are_even(seconds) {

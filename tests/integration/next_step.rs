@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use crate::support::{blind, copy_of, document, lobestone, program};
+use crate::support::{blind, copy_of, document, first_postures, lobestone, program};
 
 /// The next step, which must be the same in document and text, and name the folder.
 fn next(command: &str, dir: &str, rest: &[&str]) -> String {
@@ -143,7 +143,8 @@ fn a_campaign_with_both_sides_names_the_side() {
 
 #[test]
 fn colours_are_for_terminals() {
-    let dir = blind("frf-9114");
+    let few = first_postures("frf-9114", 2);
+    let dir = few.path();
     let run = |environment: &[(&str, &str)], extra: &[&str]| {
         let output = program()
             .args(["compare", dir.to_str().unwrap()])
@@ -167,8 +168,8 @@ fn colours_are_for_terminals() {
 
 #[test]
 fn bars_are_as_long_as_the_errors() {
-    let dir = blind("frf-9114");
-    let dir = dir.to_str().unwrap();
+    let few = first_postures("frf-9114", 2);
+    let dir = few.path().to_str().unwrap();
     let text = lobestone(&["compare", dir]).stdout;
     let compared = document(&["compare", dir]);
     let table = text.split("  posture ").nth(1).unwrap();

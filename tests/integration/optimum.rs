@@ -13,7 +13,7 @@ use lobestone::identify::{
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 
-use super::support::{append, blind, copy_folder, copy_of, document, program};
+use super::support::{append, blind, copy_folder, copy_of, document, first_postures, program};
 
 const FRF_CAMPAIGNS: [&str; 10] = [
     "frf-9000", "frf-9001", "frf-9007", "frf-9011", "frf-9112", "frf-9113", "frf-9114", "frf-9115",
@@ -404,16 +404,6 @@ fn same_with_one_thread_and_four(arguments: &[&str], campaign: &Path) {
     assert!(one.len() > 100, "{arguments:?} {campaign:?}: {one}");
     let difference = || first_difference(&one, &four);
     assert!(one == four, "{arguments:?} {campaign:?}: {}", difference());
-}
-
-/// The first postures of a campaign, each with its file.
-fn first_postures(name: &str, count: usize) -> tempfile::TempDir {
-    let few = copy_of(name);
-    let file = few.path().join("campaign.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let end = text.match_indices("[[posture]]").nth(count).unwrap().0;
-    std::fs::write(&file, &text[..end]).unwrap();
-    few
 }
 
 #[test]

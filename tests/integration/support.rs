@@ -58,6 +58,16 @@ pub fn blind(name: &str) -> PathBuf {
         .join(name)
 }
 
+/// The first postures of a campaign, each with its file.
+pub fn first_postures(name: &str, count: usize) -> tempfile::TempDir {
+    let few = copy_of(name);
+    let file = few.path().join("campaign.toml");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let end = text.match_indices("[[posture]]").nth(count).unwrap().0;
+    std::fs::write(&file, &text[..end]).unwrap();
+    few
+}
+
 pub fn truth(name: &str) -> Value {
     let file = blind("truth").join(format!("{name}.json"));
     serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()

@@ -51,6 +51,7 @@ pub use measured::faults::repair_record;
 pub(crate) use measured::in_step::OTHER_SPEED;
 pub use measured::in_step::{RecordReading, analyse_in_step};
 pub use measured::record::analyse_cut;
+pub use measured::record_slips::{CommonPassing, OtherSpeed, RecordSlips, Rectified};
 pub use measured::uneven_teeth::UnevenTeeth;
 pub(crate) use plausibility::USUAL;
 pub(crate) use warnings::of_notices;

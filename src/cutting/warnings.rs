@@ -10,14 +10,17 @@ use crate::cutting::fit::outlier::CutMisfit;
 use crate::cutting::force_model::average_force::average_row;
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::air::NO_AIR;
-use crate::cutting::measured::cut_analysis::{CutAnalysis, NOTHING_REPEATS, Notice, WRONG_SPEED};
+use crate::cutting::measured::cut_analysis::{
+    CutAnalysis, NOTHING_REPEATS, Notice, OTHER_MULTIPLE, WRONG_SPEED,
+};
+use crate::cutting::measured::record_slips::common_passing;
 use crate::data::{CutGeometry, Process};
 use crate::text::figures;
 
 /// Notices of all records, one sentence a kind.
 pub(super) fn of_records(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Vec<String> {
     let common = common_speed_error(trials, cuts);
-    let told = |notice: &&Notice| common.is_none() || notice.kind != WRONG_SPEED;
+    let told = |notice: &&Notice| common.is_none() || ![WRONG_SPEED, OTHER_MULTIPLE].contains(&notice.kind);
     let notices = cuts
         .iter()
         .flat_map(|c| c.notices.iter().filter(told).map(|n| (c.id.as_str(), n)));
@@ -62,33 +65,19 @@ fn sentences<'a>(notices: impl Iterator<Item = (&'a str, &'a Notice)>, cuts: usi
     by_kind.into_iter().map(sentence).collect()
 }
 
-/// Where the tooth-passing line of every cut is off by one factor, it is not the operator's speeds that are wrong.
+/// Where the teeth of every cut pass at another frequency by one factor, it is not the operator's speeds that are wrong.
 fn common_speed_error(trials: &CuttingTrials, cuts: &[CutAnalysis]) -> Option<String> {
-    let teeth = trials.tool.teeth.max(1);
-    let milled = || cuts.iter().filter(|c| c.process == Process::Milling);
-    let factors: Vec<f64> = milled()
-        .filter_map(|c| c.tooth_line.filter(|l| l.speed_is_doubtful()).map(|l| (c, l)))
-        .map(|(c, line)| line.tooth_hz * 60.0 / (c.spindle_rpm * teeth as f64))
-        .collect();
-    let factor = crate::signal::median(&factors);
-    let same = factors.len() >= 2 && factors.len() == milled().count();
-    if !same || factors.iter().any(|f| (f / factor - 1.0).abs() > 0.01) {
-        return None;
-    }
-    let other_teeth = (teeth as f64 * factor).round();
-    let teeth_text = if (teeth as f64 * factor / other_teeth - 1.0).abs() < 0.01 {
+    let found = common_passing(trials, &cuts.iter().collect::<Vec<_>>())?;
+    let (factor, teeth) = (found.ratio, found.stated_teeth);
+    let teeth_text = found.teeth.map_or(String::new(), |other_teeth| {
         format!("the tool has {other_teeth} teeth and not {teeth}, or ")
-    } else {
-        String::new()
-    };
-    let first = milled().next()?;
+    });
+    let (first, rpm) = &found.example;
     Some(format!(
         "all cuts: the tooth-passing line stands at {factor:.3} times the frequency that spindle_rpm and {teeth} teeth give: \
-         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is (cut {}: {:.0} rpm and not {}); \
+         {teeth_text}the sampling rate in the files is wrong by that factor, or every spindle_rpm is (cut {first}: {rpm:.0} rpm and not {}); \
          the coefficients rest on it",
-        first.id,
-        first.spindle_rpm * factor,
-        first.spindle_rpm
+        rpm / factor
     ))
 }
 

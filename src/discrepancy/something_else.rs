@@ -200,6 +200,10 @@ fn log_density(excess: f64, std: f64, scale: f64, of: fn(f64) -> f64) -> f64 {
     /// Standard deviations from which on the scatter is too narrow to matter.
     const NARROW: f64 = 8.0;
     const STEPS: usize = 1000;
+    // What has no size leaves noise alone.
+    if scale <= 0.0 {
+        return ln_normal(excess, std);
+    }
     if excess > NARROW * std {
         return of(excess / scale).ln() - scale.ln();
     }
@@ -281,6 +285,16 @@ mod tests {
         assert!(clean(1e3) < 0.15 && clean(1e3) > clean(1e4), "{}", clean(1e3));
         // What the test cannot see says nothing: the prior odds stand.
         assert!((odds(1.0, &rest(0.0, 1e4)) * LIBRARY_ODDS - 1.0).abs() < 0.1);
+    }
+
+    /// Of a campaign that small errors leave nothing of (no signal is known): a probability all the same.
+    #[test]
+    fn odds_are_numbers_where_small_errors_have_no_size() {
+        for excess in [0.0, 20.0, 3000.0] {
+            let mut rest = rest(excess, 30.0);
+            rest.small_errors = 0.0;
+            assert!(odds(1e4, &rest) > 0.0, "{excess}: {}", odds(1e4, &rest));
+        }
     }
 
     #[test]

@@ -81,29 +81,6 @@ impl CuttingCase {
     }
 }
 
-/// Pairs of the cuts `indices` of which each ran at the speed stated for the other.
-fn exchanged(campaign: &Workbench, records: &ForceRecords, indices: &[usize]) -> Vec<[String; 2]> {
-    const AS_STATED: f64 = 0.01;
-    let teeth = campaign.tool.as_ref().map_or(1, |t| t.teeth.max(1)) as f64;
-    let is_near = |a: f64, b: f64| (a / b - 1.0).abs() < AS_STATED;
-    let at_odds: Vec<(usize, f64)> = indices
-        .iter()
-        .filter_map(|&i| {
-            let line = records.averages[i].as_ref().ok()?.tooth_line.as_ref()?;
-            line.speed_is_doubtful()
-                .then_some((i, 60.0 * line.tooth_hz / teeth))
-        })
-        .collect();
-    let stated = |i: usize| campaign.cuts[i].spindle_rpm;
-    let mut pairs = Vec::new();
-    for (n, &(a, ran_a)) in at_odds.iter().enumerate() {
-        let mut others = at_odds[n + 1..].iter();
-        let other = others.find(|(b, ran_b)| is_near(ran_a, stated(*b)) && is_near(*ran_b, stated(a)));
-        pairs.extend(other.map(|(b, _)| [a, *b].map(|i| campaign.cuts[i].id.clone())));
-    }
-    pairs
-}
-
 impl CuttingData {
     /// The records of the campaign's cuts of `process`. A cut that cannot be used is left out with a warning.
     ///
@@ -161,7 +138,7 @@ impl CuttingData {
         Ok(CuttingData {
             warnings,
             speed_is_contradicted,
-            exchanged: exchanged(campaign, &records, &indices),
+            slips: records.slips(process),
             copies: copies.map(|c| (c.cuts.map(id), c.not_of.map(id))).collect(),
             ..data
         })

@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::cutting::{
-    CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, analyse_in_step,
+    CfcOptions, CfcResult, CutAnalysis, CuttingTrials, Notice, RecordReading, RecordSlips, analyse_in_step,
     contradicts_speed, fit_force_coefficients, none_usable, repair_record,
 };
-use crate::data::{Cut, Sample};
-use crate::identify::forces::cutting_data::CutData;
+use crate::data::{Cut, Process, Sample};
+use crate::identify::forces::cutting_data::{CutData, processes};
 use crate::ingest::{self, Digest, ForceFile, TimeFile, TimeRecord};
 use crate::progress::Progress;
 use crate::{Error, InputError, Result};
@@ -90,6 +90,8 @@ pub struct ForceRecords {
     pub waveforms: Vec<Result<Waveform>>,
     /// Cuts whose files, of different names, hold the same record.
     pub copies: Vec<Copied>,
+    /// What is wrong with the records or the list of the cuts, by process.
+    slips: Vec<(Process, RecordSlips)>,
 }
 
 /// The record of one cut that stands under another one's name as well.
@@ -126,7 +128,29 @@ fn copies(cuts: &[Cut], digests: &[Option<Digest>], averages: &[Result<CutAnalys
     found
 }
 
+/// What is wrong with the records of each process. Copies left out already have no record any more.
+fn slips(campaign: &Campaign, averages: &[Result<CutAnalysis>]) -> Vec<(Process, RecordSlips)> {
+    let Ok(trials) = cutting_trials(campaign) else {
+        return Vec::new();
+    };
+    let of = |process: Process| {
+        let records: Vec<&CutAnalysis> = averages
+            .iter()
+            .flatten()
+            .filter(|r| r.process == process)
+            .collect();
+        (process, RecordSlips::of(&trials, &records))
+    };
+    processes(&campaign.cuts).into_iter().map(of).collect()
+}
+
 impl ForceRecords {
+    /// What is wrong with the records of a process.
+    pub fn slips(&self, process: Process) -> RecordSlips {
+        let found = self.slips.iter().find(|(own, _)| *own == process);
+        found.map(|(_, slips)| slips.clone()).unwrap_or_default()
+    }
+
     /// Each record is read once (in parallel, one record in memory per thread; long ones few at a time), however often this is
     /// asked for.
     pub fn of(campaign: &Workbench) -> Arc<Self> {
@@ -177,10 +201,20 @@ impl ForceRecords {
                 waveforms[*cut] = Err(error);
             }
         }
+        let slips = slips(plain, &averages);
+        for (id, why, remedy) in slips.iter().flat_map(|(_, slips)| slips.left_out()) {
+            let Some(cut) = plain.cuts.iter().position(|cut| cut.id == id) else {
+                continue;
+            };
+            let error = Error::from(InputError::new(why).file(&plain.cuts[cut].file).remedy(remedy));
+            averages[cut] = Err(error.clone());
+            waveforms[cut] = Err(error);
+        }
         ForceRecords {
             averages,
             waveforms,
             copies,
+            slips,
         }
     }
 }
@@ -258,7 +292,7 @@ mod tests {
         CUT_S, MadeCut, MadeTool, TRUTH, write_campaign, write_campaign_of,
     };
     use crate::cutting::{OTHER_SPEED, WRONG_SPEED, analyse_cut};
-    use crate::data::{CutGeometry, Process};
+    use crate::data::CutGeometry;
     use crate::identify::CuttingData;
     use std::f64::consts::TAU;
 
@@ -365,6 +399,96 @@ mod tests {
         assert!(
             !warnings.iter().any(|w| w.contains("rpm and not")),
             "{warnings:?}"
+        );
+    }
+
+    /// Slots of two speeds, their files changed by `change` (text of cut 02 or of all), and the campaign by `list`.
+    fn told_of(
+        change: &dyn Fn(&str) -> String,
+        which: &[usize],
+        list: &dyn Fn(&mut Campaign),
+    ) -> (CuttingData, Vec<crate::discrepancy::setup::SetupFinding>, bool) {
+        let dir = tempfile::tempdir().unwrap();
+        let cuts: Vec<MadeCut> = [
+            (1200.0, 0.05),
+            (1200.0, 0.1),
+            (1200.0, 0.16),
+            (1700.0, 0.08),
+            (1700.0, 0.12),
+        ]
+        .map(|(rpm, feed_mm)| MadeCut {
+            rpm,
+            feed_mm,
+            speed: &|_| 1.0,
+        })
+        .into();
+        let mut campaign = write_campaign(dir.path(), &cuts, &|_, _, _, _, _| 0.0);
+        for &cut in which {
+            let file = &campaign.cuts[cut].file;
+            let text = std::fs::read_to_string(file).unwrap();
+            std::fs::write(file, change(&text)).unwrap();
+        }
+        list(&mut campaign);
+        let data = CuttingData::on(&Workbench::new(&campaign), Process::Milling).unwrap();
+        let check = crate::discrepancy::setup::examine_cutting(&data, || None).unwrap();
+        let likely = check.likely().is_some();
+        (data, check.findings, likely)
+    }
+
+    #[test]
+    fn records_and_lists_that_contradict_each_other_are_named_before_anything_is_fitted() {
+        let as_it_is = |text: &str| text.to_string();
+        let unchanged = |_: &mut Campaign| {};
+        let all = [0, 1, 2, 3, 4];
+        let clean = told_of(&as_it_is, &[], &unchanged);
+        assert_eq!((clean.0.cuts.len(), clean.1), (5, Vec::new()));
+
+        // The air of the first half second again and again.
+        let nothing_cut = |text: &str| {
+            let lines: Vec<&str> = text.lines().collect();
+            let row = |(i, line): (usize, &&str)| {
+                let time = line.split(',').next().unwrap_or_default();
+                let air = lines[1 + (i - 1) % 2000].split_once(',').map_or("", |row| row.1);
+                format!("{time},{air}\n")
+            };
+            lines[0].to_string() + "\n" + &lines.iter().enumerate().skip(1).map(row).collect::<String>()
+        };
+        let (data, found, likely) = told_of(&nothing_cut, &[1], &unchanged);
+        assert_eq!(
+            (found.len(), found[0].kind, found[0].place.as_str()),
+            (1, "no-cutting", "cut 02")
+        );
+        assert!(data.cuts.len() == 4 && !likely, "{found:?}");
+
+        let typed_wrong = |campaign: &mut Campaign| campaign.cuts[2].spindle_rpm = 1200.0 / 1.285;
+        let (data, found, likely) = told_of(&as_it_is, &[], &typed_wrong);
+        assert_eq!(
+            (found.len(), found[0].kind, found[0].place.as_str()),
+            (1, "spindle-speed", "cut 03")
+        );
+        assert!((found[0].value.unwrap() / 1200.0 - 1.0).abs() < 1e-3, "{found:?}");
+        assert!(data.cuts.len() == 4 && !likely, "{found:?}");
+
+        for teeth in [2, 3, 5] {
+            let other_tool = |campaign: &mut Campaign| campaign.tool.as_mut().unwrap().teeth = teeth;
+            let (_, found, likely) = told_of(&as_it_is, &[], &other_tool);
+            assert_eq!(
+                (found[0].kind, found[0].value),
+                ("teeth", Some(4.0)),
+                "{teeth}: {found:?}"
+            );
+            assert!(likely);
+        }
+
+        let absolute = |text: &str| text.replace(",-", ",");
+        let (_, found, likely) = told_of(&absolute, &all, &unchanged);
+        assert_eq!((found.len(), found[0].kind), (1, "rectified"), "{found:?}");
+        assert!(likely && found[0].place.starts_with("all cuts, Fx"), "{found:?}");
+        let (data, found, likely) = told_of(&absolute, &[3], &unchanged);
+        assert_eq!((found.len(), found[0].kind), (1, "rectified"), "{found:?}");
+        assert!(
+            data.cuts.len() == 4 && !likely && found[0].place.starts_with("cut 04, Fx"),
+            "{found:?}"
         );
     }
 

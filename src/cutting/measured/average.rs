@@ -280,6 +280,7 @@ mod tests {
             contact_share: 1.0,
             averages: [None; 4],
             tooth_line: None,
+            passes_times: None,
             uneven_teeth: None,
             spindle: None,
             notices: Vec::new(),

@@ -2,6 +2,7 @@
 
 use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::measured::uneven_teeth::UnevenTeeth;
+use crate::cutting::measured::whole_record::WholeRecord;
 use crate::data::Process;
 use crate::signal::{DriftLine, SpindleTrack, ToothLine};
 
@@ -36,6 +37,8 @@ pub struct ChannelAnalysis {
     pub drift: DriftLine,
     /// Over the steady window, drift taken off.
     pub mean: TurnAverage,
+    /// Not drift compensated.
+    pub whole: WholeRecord,
     /// Not drift compensated.
     pub trace: Trace,
 }
@@ -84,6 +87,8 @@ pub struct CutAnalysis {
     pub averages: [Option<Average>; 4],
     /// Milling: the tooth-passing line in all force channels together; `None` where the window is too short for one.
     pub tooth_line: Option<ToothLine>,
+    /// Milling: how many times as often as stated the teeth pass, where the record says otherwise than campaign.toml.
+    pub passes_times: Option<f64>,
     /// Milling: that the teeth, which are not listed one by one, cut unequally, where that stands above the noise.
     pub uneven_teeth: Option<UnevenTeeth>,
     /// How the spindle ran, where it did not keep the stated speed.
@@ -178,6 +183,12 @@ pub(super) fn made_channel(axis: ForceAxis, average: Average) -> ChannelAnalysis
             turn_std: Some(1.0),
             zero_std: 0.0,
             dropped: 0,
+        },
+        whole: WholeRecord {
+            mean: average.value,
+            std: average.value.abs(),
+            air_std: None,
+            is_rectified: false,
         },
         trace: Trace {
             time_s: Vec::new(),

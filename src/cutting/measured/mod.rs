@@ -9,5 +9,7 @@ pub(crate) mod in_step;
 mod jump;
 pub(crate) mod leak;
 pub(crate) mod record;
+pub(crate) mod record_slips;
 pub(crate) mod teeth;
 pub(crate) mod uneven_teeth;
+pub(crate) mod whole_record;

@@ -16,10 +16,11 @@ use crate::cutting::measured::cut_analysis::{
 };
 use crate::cutting::measured::leak::high_pass;
 use crate::cutting::measured::teeth::{
-    CERTAIN, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn, tooth_back_mm,
+    CERTAIN, TwiceOverOnce, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn, tooth_back_mm,
     tooth_passing_too_weak, uneven_chip_mm,
 };
 use crate::cutting::measured::uneven_teeth::UnevenTeeth;
+use crate::cutting::measured::whole_record::WholeRecord;
 use crate::cutting::waveform::MillingCut;
 use crate::data::{ChannelRole, Cut, CutGeometry, Process, Sample, TimeRecord, Tool};
 use crate::signal::{
@@ -199,6 +200,7 @@ pub fn analyse_cut<S: Sample>(
                 axis,
                 drift,
                 mean,
+                whole: WholeRecord::of(values, &phases.air),
                 trace: trace(values, record),
             }
         })
@@ -294,7 +296,9 @@ pub fn analyse_cut<S: Sample>(
         });
     }
     let mut of_turn = None;
+    let mut passes_times = None;
     if let Some(line) = tooth_line.filter(ToothLine::speed_is_doubtful) {
+        passes_times = Some(60.0 * line.tooth_hz / (cut.spindle_rpm * tool.teeth.max(1) as f64));
         notices.push(Notice {
             kind: WRONG_SPEED,
             detail: wrong_speed(&line, cut.spindle_rpm, tool.teeth.max(1)),
@@ -304,6 +308,7 @@ pub fn analyse_cut<S: Sample>(
         of_turn = turn_orders(trials, cut, &channels, &usable, &phases, record);
         if let Some(of_turn) = &of_turn {
             teeth_notice(of_turn, cut, &mut notices);
+            passes_times = of_turn.twice_as_often().map(|_| 2.0);
         }
     }
     Ok(CutAnalysis {
@@ -326,6 +331,7 @@ pub fn analyse_cut<S: Sample>(
         averages: in_tool_axes(trials.tool_from_dyno, &channels),
         channels,
         tooth_line,
+        passes_times,
         uneven_teeth: of_turn.as_ref().and_then(TurnOrders::uneven_teeth),
         spindle: None,
         notices,
@@ -612,6 +618,23 @@ impl TurnOrders {
             && in_air < TURNING_IN_AIR * size
     }
 
+    /// The line at twice the stated tooth passing is stronger than any cut of the stated teeth makes it.
+    fn twice_as_often(&self) -> Option<TwiceOverOnce> {
+        let is_judged =
+            self.milling.places.is_empty() && !is_noise(&self.over_noise) && !self.turns_with_the_tool();
+        if !is_judged {
+            return None;
+        }
+        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
+        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        tooth_passing_too_weak(
+            &self.milling,
+            orders,
+            std,
+            self.zero_is_known.then_some(self.mean),
+        )
+    }
+
     /// Where the teeth are not listed one by one.
     fn uneven_teeth(&self) -> Option<UnevenTeeth> {
         if !self.milling.places.is_empty() || is_noise(&self.over_noise) {
@@ -737,9 +760,7 @@ fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
         }
         return;
     }
-    let known_mean = zero_is_known.then_some(mean);
-    let slow = tooth_passing_too_weak(milling, orders, std, known_mean);
-    if let Some(slow) = slow {
+    if let Some(slow) = of_turn.twice_as_often() {
         notices.push(Notice {
             kind: OTHER_MULTIPLE,
             detail: format!(

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use crate::cutting::waveform::{DrillTerm, DrillingCut, MillingCut, UnitForces};
-use crate::cutting::{CutAnalysis, EdgeBit, ForceAxis, engaged_edge, feed_mm, record_at_full_contact};
+use crate::cutting::{
+    CutAnalysis, EdgeBit, ForceAxis, RecordSlips, engaged_edge, feed_mm, record_at_full_contact,
+};
 use crate::data::{ChannelRole, Cut, Immersion, Process, Sample, TimeRecord, Tool};
 use crate::effects::cutting::{CutSetting, CuttingSummary};
 use crate::identify::forces::asynchronous_lines::{
@@ -319,6 +321,31 @@ impl CutData {
         }
     }
 
+    /// For another hole than stated: the first contact may be anywhere before the steady cut.
+    fn find_contact_again(&mut self) {
+        let (first, last) = (self.block_s.first(), self.block_s.get(self.steady.start));
+        if let (Some(first), Some(last), CutKind::Drilling { contact_s, .. }) = (first, last, &mut self.kind)
+            && last[0] > first[0]
+        {
+            *contact_s = [first[0], last[0]];
+            self.narrow_contact();
+        }
+    }
+
+    /// Levels of the steady cut above the air before it, over their standard deviations.
+    pub(crate) fn levels_over_noise<'a>(
+        &self,
+        channel: &'a ForceChannel,
+    ) -> impl Iterator<Item = f64> + use<'a> {
+        let before = self.steady.start.min(AIR_BLOCKS);
+        let air = channel.level[..before].iter().sum::<f64>() / before.max(1) as f64;
+        let steady = self.steady.clone();
+        channel.level[steady.clone()]
+            .iter()
+            .zip(&channel.level_std[steady])
+            .map(move |(level, std)| (level - air) / std)
+    }
+
     /// Mean steady level of a channel above its first blocks.
     fn mean_above_air(&self, channel: usize) -> Option<f64> {
         let level = &self.channels[channel].as_ref()?.level;
@@ -326,7 +353,7 @@ impl CutData {
             let n = r.len().max(1) as f64;
             level.get(r).map_or(0.0, |l| l.iter().sum::<f64>() / n)
         };
-        let before = self.steady.start.min(5);
+        let before = self.steady.start.min(AIR_BLOCKS);
         Some(of(self.steady.clone()) - if before > 0 { of(0..before) } else { 0.0 })
     }
 
@@ -358,14 +385,18 @@ pub struct CuttingData {
     /// Half of the records or more contradict their stated speed, or repeat nothing with it: what their waveforms say of channels,
     /// axes and physics is not to be believed.
     pub speed_is_contradicted: bool,
-    /// Ids of two cuts of which each ran at the speed stated for the other.
-    pub exchanged: Vec<[String; 2]>,
+    /// What the records show to be wrong with themselves or with the list of the cuts; some cuts were left out for it.
+    pub slips: RecordSlips,
     /// Ids of cuts whose files hold the same record, and of the one that it is not of, where that is known.
     pub copies: Vec<([String; 2], Option<String>)>,
     /// Cuts left out, with the reason.
     pub warnings: Vec<String>,
 }
 
+/// Blocks at the beginning that the air before the cut is taken from, at most.
+const AIR_BLOCKS: usize = 5;
+/// A pilot hole leaves the lips at least a fiftieth of the drill's radius.
+const WIDEST_PILOT: f64 = 0.98;
 /// Orders kept for each tooth, and in all.
 const ORDERS_PER_TOOTH: usize = 24;
 const MOST_ORDERS: usize = 96;
@@ -421,7 +452,7 @@ impl CuttingData {
             dyno_from_tool: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
             summary,
             speed_is_contradicted: false,
-            exchanged: Vec::new(),
+            slips: RecordSlips::default(),
             copies: Vec::new(),
             warnings: Vec::new(),
         })
@@ -465,8 +496,63 @@ impl CuttingData {
             CutKind::Drilling { cut: hole, .. } => {
                 hole.geometry.feed_per_rev_mm *= factor;
                 hole.feed_mm_per_s *= factor;
+                cut.find_contact_again();
             }
             CutKind::Turning { .. } => {}
+        }
+        own
+    }
+
+    /// One hole drilled with `factor` times the stated spindle speed at the stated feed per revolution.
+    #[must_use]
+    pub fn with_drill_speed_of(&self, cut: usize, factor: f64) -> Self {
+        self.drilled_otherwise(|i| i == cut, |hole| hole.feed_mm_per_s *= factor)
+    }
+
+    /// One hole whose lips begin at `factor` times the stated radius: that of its pilot hole, or the chisel's half length.
+    #[must_use]
+    pub fn with_pilot_of(&self, cut: usize, factor: f64) -> Self {
+        self.drilled_otherwise(
+            |i| i == cut,
+            |hole| {
+                let g = &mut hole.geometry;
+                g.inner_radius_mm = (factor * g.inner_radius_mm).min(WIDEST_PILOT * g.radius_mm);
+            },
+        )
+    }
+
+    /// All holes drilled with a drill of `factor` times the stated diameter; their pilot holes stay.
+    #[must_use]
+    pub fn with_drill_diameter(&self, factor: f64) -> Self {
+        self.drilled_otherwise(
+            |_| true,
+            |hole| {
+                let g = &mut hole.geometry;
+                g.radius_mm = (factor * g.radius_mm).max(g.inner_radius_mm / WIDEST_PILOT);
+            },
+        )
+    }
+
+    /// All holes drilled with a point of which half the angle has `factor` times the tangent stated: it enters so many times as fast.
+    #[must_use]
+    pub fn with_point_angle(&self, factor: f64) -> Self {
+        self.drilled_otherwise(
+            |_| true,
+            |hole| {
+                let g = &mut hole.geometry;
+                g.half_point_rad = (factor * g.half_point_rad.tan()).atan();
+            },
+        )
+    }
+
+    fn drilled_otherwise(&self, which: impl Fn(usize) -> bool, otherwise: impl Fn(&mut DrillingCut)) -> Self {
+        let mut own = self.clone();
+        for (_, cut) in own.cuts.iter_mut().enumerate().filter(|(i, _)| which(*i)) {
+            let cut = Arc::make_mut(cut);
+            if let CutKind::Drilling { cut: hole, .. } = &mut cut.kind {
+                otherwise(hole);
+                cut.find_contact_again();
+            }
         }
         own
     }

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 use crate::Result;
 use crate::effects::{Cutting, Known, Registry};
-use crate::identify::forces::cutting_data::CuttingData;
+use crate::identify::forces::cutting_data::{CutData, CuttingData, ForceChannel};
 use crate::identify::forces::cutting_model::CuttingModel;
 use crate::identify::forces::cutting_problem::{CutFit, CuttingProblem};
 use crate::identify::forces::cutting_waves::axis_waves;
@@ -185,14 +185,28 @@ const ALL_OVER: &str = "more than the noise all over";
 /// Relative standard deviation of the noise variance as revolutions against one another show it.
 pub const NOISE_KNOWN_TO: f64 = 0.02;
 
-/// Σ r²/σ² over real values that errors of [`SMALL_ERROR`] of every recorded order leave.
+/// Σ r²/σ² over real values that errors of [`SMALL_ERROR`] of every recorded order leave; of a channel without orders (drilling,
+/// turning), of every level of the steady cut. (Without those nothing would be excused there, and an error of no size has no density.)
 pub fn small_errors(data: &CuttingData) -> f64 {
-    let channels = data.cuts.iter().flat_map(|cut| cut.channels.iter().flatten());
-    channels
-        .flat_map(|channel| channel.orders.iter().zip(&channel.order_std))
-        .map(|(order, std)| 2.0 * order.norm_sqr() / (std * std))
-        .sum::<f64>()
-        * SMALL_ERROR.powi(2)
+    let of_channel = |cut: &CutData, channel: &ForceChannel| -> f64 {
+        match channel.orders.is_empty() {
+            true => cut.levels_over_noise(channel).map(|level| level * level).sum(),
+            false => {
+                let orders = channel.orders.iter().zip(&channel.order_std);
+                orders
+                    .map(|(order, std)| 2.0 * order.norm_sqr() / (std * std))
+                    .sum()
+            }
+        }
+    };
+    let cuts = data.cuts.iter();
+    let all = cuts.flat_map(|cut| {
+        cut.channels
+            .iter()
+            .flatten()
+            .map(move |channel| of_channel(cut, channel))
+    });
+    all.sum::<f64>() * SMALL_ERROR.powi(2)
 }
 
 /// Energy of the residual waveform that the cuts have in common, each turned to the same angle of the tool, and the number
@@ -361,6 +375,18 @@ mod tests {
         });
         // Three channels of 2 · (0.01 · 50 N / 2 N)².
         assert_relative_eq!(small_errors(&data), 3.0 * 2.0 * 0.0625, max_relative = 1e-12);
+    }
+
+    /// A bar is turned without orders: six levels of each of its three forces, known to 1 N, above a zero that rises by 2 N/s.
+    #[test]
+    fn small_errors_of_cuts_without_orders_are_a_hundredth_of_their_levels() {
+        let data = turned(METAL, &[0.2]);
+        // x, y, z: 1.5 mm · (300 · 0.2 + 25, 150 · 0.2 + 3, 800 · 0.2 + 20) N/mm; the air lies half a second before the cut.
+        let squares: f64 = [127.5f64, 49.5, 270.0]
+            .iter()
+            .map(|force| (force + 1.0).powi(2))
+            .sum();
+        assert_relative_eq!(small_errors(&data), 6.0 * 1e-4 * squares, max_relative = 1e-3);
     }
 
     /// Cuts left out are predicted from the others: where all were made by one law there is no error, and its coefficients are found.

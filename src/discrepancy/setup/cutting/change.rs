@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
+use super::axes_of_cuts::OtherAxes;
 use super::gain::OtherGain;
 use super::plausible::fit;
+use crate::cutting::DrillGeometry;
 use crate::discrepancy::setup::decide::TriedMistake;
 use crate::discrepancy::setup::finding::{SetupFinding, with_error};
 use crate::identify::CuttingData;
@@ -27,10 +29,20 @@ pub(super) enum RecordChange {
     SpeedWander { steady_in_time: bool },
     /// Time constant of the amplifiers, s.
     LowPass { order: u8 },
+    /// Length of time that was averaged over, s.
+    MovingAverage,
     /// Logarithm of the true feed of one cut over the stated one.
     FeedOf(usize),
     /// Logarithm of the true depth of one cut over the stated one.
     DepthOf(usize),
+    /// Logarithm of the true spindle speed of one hole over the stated one: nothing but the speed of its entry tells.
+    DrillSpeedOf(usize),
+    /// Logarithm of the true radius at which the lips begin in one hole (its pilot's) over the stated one.
+    PilotOf(usize),
+    /// Logarithm of the true diameter of the drill over the stated one.
+    DrillDiameter,
+    /// Logarithm of the true tangent of half the point angle over the stated one.
+    PointAngle,
     /// Logarithm of the true width over the stated one: of one cut, or of all.
     Width(Option<usize>),
     /// Logarithm of the true tangent of the helix over the stated one.
@@ -39,6 +51,8 @@ pub(super) enum RecordChange {
     Exchanged([usize; 2]),
     /// Logarithm of another gain of some records over what it looks like.
     Gain(OtherGain),
+    /// Another order of the channels of some records: nothing to fit.
+    Axes(OtherAxes),
 }
 
 impl RecordChange {
@@ -48,12 +62,17 @@ impl RecordChange {
         match self {
             RecordChange::FeedOf(cut) => return data.with_feed_of(*cut, value.exp()),
             RecordChange::DepthOf(cut) => return data.with_depth_of(*cut, value.exp()),
+            RecordChange::DrillSpeedOf(cut) => return data.with_drill_speed_of(*cut, value.exp()),
+            RecordChange::PilotOf(cut) => return data.with_pilot_of(*cut, value.exp()),
+            RecordChange::DrillDiameter => return data.with_drill_diameter(value.exp()),
+            RecordChange::PointAngle => return data.with_point_angle(value.exp()),
             RecordChange::Width(only) => {
                 return data.with_width_of(|i| only.is_none_or(|one| one == i), value.exp());
             }
             RecordChange::Helix => return data.with_helix(value.exp()),
             RecordChange::Exchanged(cuts) => return data.with_exchanged(*cuts),
             RecordChange::Gain(gain) => return gain.undone(data, value.exp()),
+            RecordChange::Axes(axes) => return axes.undone(data),
             RecordChange::GainOfY => {
                 let channel = 1;
                 for row in &mut own.tool_from_dyno {
@@ -75,6 +94,22 @@ impl RecordChange {
                             let smeared = (-0.5 * ((k + 1) as f64 * angle).powi(2)).exp().max(1e-3);
                             *line /= smeared;
                             *std /= smeared;
+                        }
+                    }
+                }
+            }
+            RecordChange::MovingAverage => {
+                for cut in &mut own.cuts {
+                    let half_turns = std::f64::consts::PI * cut.spindle_hz() * value;
+                    for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
+                        let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
+                        for (k, (line, std)) in lines.enumerate() {
+                            let x = (k + 1) as f64 * half_turns;
+                            let left = if x > 0.0 { x.sin() / x } else { 1.0 };
+                            // Where whole periods were averaged nothing is left that could be brought back.
+                            let left = left.abs().max(1e-3).copysign(left);
+                            *line /= left;
+                            *std /= left.abs();
                         }
                     }
                 }
@@ -102,17 +137,27 @@ impl RecordChange {
     }
 
     /// Values to begin with, rising.
-    fn starts(&self) -> [f64; 4] {
+    fn starts(&self) -> &'static [f64] {
         match self {
-            RecordChange::GainOfY => [-0.3, -0.1, 0.1, 0.3],
+            RecordChange::GainOfY => &[-0.3, -0.1, 0.1, 0.3],
             RecordChange::SpeedWander {
                 steady_in_time: false,
-            } => [0.0, 5e-3, 2e-2, 5e-2],
-            RecordChange::SpeedWander { steady_in_time: true } => [0.0, 5e-5, 2e-4, 5e-4],
-            RecordChange::LowPass { .. } => [0.0, 5e-5, 2e-4, 6e-4],
-            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) => [-0.7, -0.2, 0.2, 0.7],
-            RecordChange::Width(_) | RecordChange::Helix => [-0.5, -0.15, 0.15, 0.5],
-            RecordChange::Gain(_) | RecordChange::Exchanged(_) => [-0.1, -0.02, 0.02, 0.1],
+            } => &[0.0, 5e-3, 2e-2, 5e-2],
+            RecordChange::SpeedWander { steady_in_time: true } => &[0.0, 5e-5, 2e-4, 5e-4],
+            // Corners from 3 kHz down to 30 Hz.
+            RecordChange::LowPass { .. } => &[0.0, 5e-5, 2e-4, 6e-4, 2e-3, 5e-3],
+            // Each order comes back with the other sign where it is averaged over more than its period: steps are short against that.
+            RecordChange::MovingAverage => &[0.0, 2e-4, 5e-4, 1e-3, 2e-3, 3e-3, 4e-3, 6e-3, 8e-3],
+            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) | RecordChange::PilotOf(_) => {
+                &[-0.7, -0.2, 0.2, 0.7]
+            }
+            RecordChange::Width(_) | RecordChange::Helix => &[-0.5, -0.15, 0.15, 0.5],
+            RecordChange::DrillSpeedOf(_) | RecordChange::DrillDiameter | RecordChange::PointAngle => {
+                &[-0.3, -0.1, 0.1, 0.3]
+            }
+            RecordChange::Gain(_) | RecordChange::Exchanged(_) | RecordChange::Axes(_) => {
+                &[-0.1, -0.02, 0.02, 0.1]
+            }
         }
     }
 
@@ -125,9 +170,13 @@ impl RecordChange {
             } => [0.0, 0.3],
             RecordChange::SpeedWander { steady_in_time: true } => [0.0, 3e-3],
             RecordChange::LowPass { .. } => [0.0, 0.01],
-            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) => [-2.5, 2.5],
+            RecordChange::MovingAverage => [0.0, 0.02],
+            RecordChange::FeedOf(_) | RecordChange::DepthOf(_) | RecordChange::PilotOf(_) => [-2.5, 2.5],
+            RecordChange::DrillSpeedOf(_) | RecordChange::DrillDiameter | RecordChange::PointAngle => {
+                [-1.0, 1.0]
+            }
             RecordChange::Width(_) | RecordChange::Helix => [-1.5, 1.5],
-            RecordChange::Gain(_) | RecordChange::Exchanged(_) => [-1.0, 1.0],
+            RecordChange::Gain(_) | RecordChange::Exchanged(_) | RecordChange::Axes(_) => [-1.0, 1.0],
         }
     }
 
@@ -139,7 +188,7 @@ impl RecordChange {
             Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
         };
         let mut points: Vec<(f64, f64)> = Vec::new();
-        for value in self.starts() {
+        for &value in self.starts() {
             points.push((value, chi2(value)?));
         }
         let mut around = [points[0]; 3];
@@ -177,18 +226,25 @@ impl RecordChange {
                 let kept = rest.value_count() as f64;
                 (0.0, 0.0, fit(&rest)?.reduced_chi2 * kept + values - kept)
             }
-            RecordChange::Exchanged(_) => (0.0, 0.0, fit(&self.undone(data, 0.0))?.reduced_chi2 * values),
+            RecordChange::Exchanged(_) | RecordChange::Axes(_) => {
+                (0.0, 0.0, fit(&self.undone(data, 0.0))?.reduced_chi2 * values)
+            }
             _ => self.best(data)?,
         };
         let is_slip = match self {
             RecordChange::FeedOf(_)
             | RecordChange::DepthOf(_)
+            | RecordChange::DrillSpeedOf(_)
+            | RecordChange::PilotOf(_)
+            | RecordChange::DrillDiameter
+            | RecordChange::PointAngle
             | RecordChange::Width(_)
             | RecordChange::Helix => value.abs() >= LEAST_SLIP,
-            RecordChange::Exchanged(_) | RecordChange::Gain(_) => true,
-            RecordChange::GainOfY | RecordChange::SpeedWander { .. } | RecordChange::LowPass { .. } => {
-                value != 0.0
-            }
+            RecordChange::Exchanged(_) | RecordChange::Gain(_) | RecordChange::Axes(_) => true,
+            RecordChange::GainOfY
+            | RecordChange::SpeedWander { .. }
+            | RecordChange::LowPass { .. }
+            | RecordChange::MovingAverage => value != 0.0,
         };
         let is_better = chi2 < base;
         if !is_better || !is_slip {
@@ -221,12 +277,67 @@ impl RecordChange {
                 0.0,
             ),
             RecordChange::Gain(gain) => gain.finding(data, value, std),
+            RecordChange::Axes(axes) => axes.finding(data),
             RecordChange::FeedOf(cut) => {
                 other_than_stated(&data.cuts[*cut].id, "feed-override", "feed", value, std)
             }
             RecordChange::DepthOf(cut) => {
                 other_than_stated(&data.cuts[*cut].id, "axial-depth", "axial depth", value, std)
             }
+            RecordChange::DrillSpeedOf(cut) => {
+                let found =
+                    other_than_stated(&data.cuts[*cut].id, "spindle-speed", "spindle speed", value, std);
+                let rpm = value.exp() * data.cuts[*cut].spindle_rpm;
+                told_as(found, rpm, std, "1/min", &format!("spindle_rpm = {rpm:.0}"))
+            }
+            RecordChange::PilotOf(cut) => pilot(data, *cut, value, std),
+            RecordChange::DrillDiameter => {
+                let diameter_mm = value.exp() * 2.0 * drill(data).map_or(0.0, |g| g.radius_mm);
+                let truth = format!("diameter_mm = {diameter_mm:.2} in [tool]");
+                let found = all_otherwise(
+                    "tool-diameter",
+                    "tool",
+                    "diameter of the drill",
+                    &truth,
+                    value,
+                    std,
+                );
+                told_as(found, diameter_mm, std, "mm", "")
+            }
+            RecordChange::PointAngle => {
+                let tangent = value.exp() * drill(data).map_or(0.0, |g| g.half_point_rad.tan());
+                let half_deg = tangent.atan().to_degrees();
+                let truth = format!("half_point_angle_deg = {half_deg:.1} in [tool]");
+                let found = all_otherwise(
+                    "point-angle",
+                    "tool",
+                    "tangent of half the point angle",
+                    &truth,
+                    value,
+                    std,
+                );
+                // d atan(t) = t/(1 + t²) d ln t.
+                let error_deg = (std * tangent / (1.0 + tangent * tangent)).to_degrees();
+                SetupFinding {
+                    value: Some(half_deg),
+                    std_error: Some(error_deg),
+                    unit: "deg",
+                    ..found
+                }
+            }
+            RecordChange::MovingAverage => SetupFinding {
+                kind: "moving-average",
+                place: "all cuts, all channels".into(),
+                value: Some(1e3 * value),
+                std_error: Some(1e3 * std),
+                unit: "ms",
+                confidence: 0.0,
+                remedy: format!(
+                    "Export the records as they were sampled: each sample is the mean of {} ms ({}), which takes the peaks of the teeth away.",
+                    with_error(1e3 * value, 1e3 * std),
+                    samples(data, value)
+                ),
+            },
             RecordChange::GainOfY => {
                 let factor = value.exp();
                 let error = factor * std;
@@ -284,14 +395,20 @@ impl RecordChange {
         Some(TriedMistake {
             finding,
             chi2,
-            parameters: usize::from(!matches!(self, RecordChange::Exchanged(_))),
+            parameters: usize::from(!matches!(
+                self,
+                RecordChange::Exchanged(_) | RecordChange::Axes(_)
+            )),
             tried: match self {
-                RecordChange::FeedOf(_) | RecordChange::DepthOf(_) | RecordChange::Width(Some(_)) => {
-                    3.0 * data.cuts.len() as f64
-                }
+                RecordChange::FeedOf(_)
+                | RecordChange::DepthOf(_)
+                | RecordChange::DrillSpeedOf(_)
+                | RecordChange::PilotOf(_)
+                | RecordChange::Width(Some(_)) => 3.0 * data.cuts.len() as f64,
                 // Of one cut alone a slip of the pen is more likely than another range of all channels.
                 RecordChange::Gain(gain) if gain.is_of_one_cut() => 40.0 * data.cuts.len() as f64,
                 RecordChange::Gain(_) => 4.0 * data.cuts.len() as f64,
+                RecordChange::Axes(_) => 40.0 * data.cuts.len() as f64,
                 RecordChange::Exchanged(_) => (data.cuts.len() * data.cuts.len()) as f64,
                 _ => 4.0,
             },
@@ -383,6 +500,75 @@ fn other_than_stated(id: &str, kind: &'static str, what: &str, value: f64, std: 
             with_error(factor, error)
         ),
     }
+}
+
+/// `found` with its size in the unit of campaign.toml, known to `std` of itself, and the `line` to write.
+fn told_as(found: SetupFinding, size: f64, std: f64, unit: &'static str, line: &str) -> SetupFinding {
+    let line = match line {
+        "" => String::new(),
+        line => format!(" True is {line}."),
+    };
+    SetupFinding {
+        value: Some(size),
+        std_error: Some(size * std),
+        unit,
+        remedy: found.remedy + &line,
+        ..found
+    }
+}
+
+/// What the drill is in the first hole.
+fn drill(data: &CuttingData) -> Option<&DrillGeometry> {
+    data.cuts.iter().find_map(|cut| match &cut.kind {
+        CutKind::Drilling { cut, .. } => Some(&cut.geometry),
+        CutKind::Milling { .. } | CutKind::Turning { .. } => None,
+    })
+}
+
+/// A hole whose lips begin at another radius than stated, by a factor whose logarithm is `value`.
+fn pilot(data: &CuttingData, cut: usize, value: f64, std: f64) -> SetupFinding {
+    let id = &data.cuts[cut].id;
+    let radius_mm = |cut: &CutData, full: bool| match &cut.kind {
+        CutKind::Drilling { cut, .. } if cut.full_hole || !full => Some(cut.geometry.inner_radius_mm),
+        _ => None,
+    };
+    let diameter_mm = 2.0 * value.exp() * radius_mm(&data.cuts[cut], false).unwrap_or(0.0);
+    let chisel_mm = data
+        .cuts
+        .iter()
+        .find_map(|cut| radius_mm(cut, true))
+        .map(|half| 2.0 * half);
+    // The lips of a hole without a pilot begin where the chisel ends.
+    let is_full =
+        chisel_mm.is_some_and(|chisel| (diameter_mm / chisel).ln().abs() < (3.0 * std).max(LEAST_SLIP));
+    let written = match is_full {
+        true => "pilot_diameter_mm = 0.0".to_string(),
+        false => format!("pilot_diameter_mm = {diameter_mm:.2}"),
+    };
+    SetupFinding {
+        kind: "pilot-diameter",
+        place: format!("cut {id}"),
+        value: Some(if is_full { 0.0 } else { diameter_mm }),
+        std_error: Some(diameter_mm * std),
+        unit: "mm",
+        confidence: 0.0,
+        remedy: format!(
+            "Look what pilot hole cut {id} had: its thrust, torque and entry are those of lips that begin at a diameter of {} mm. Write \
+             {written} for it, or leave the cut out.",
+            with_error(diameter_mm, diameter_mm * std)
+        ),
+    }
+}
+
+/// `20 samples at 5000 Hz`: what was averaged, by the first record.
+fn samples(data: &CuttingData, length_s: f64) -> String {
+    data.cuts.first().map_or(String::new(), |cut| {
+        format!(
+            "{:.0} samples at {:.0} Hz",
+            length_s * cut.sample_rate_hz,
+            cut.sample_rate_hz
+        )
+    })
 }
 
 /// Second derivative of the parabola through three points.

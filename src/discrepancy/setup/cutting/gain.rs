@@ -25,10 +25,10 @@ const ALIKE: f64 = 0.1;
 /// A channel with less of its force than this has none of it.
 const NONE_OF_IT: f64 = 0.03;
 /// Cuts before and after a switch, at least.
-const BEFORE: usize = 3;
-const AFTER: usize = 2;
+pub(super) const BEFORE: usize = 3;
+pub(super) const AFTER: usize = 2;
 /// Places in a sequence at which a switch is looked for first.
-const STEPS: usize = 24;
+pub(super) const STEPS: usize = 24;
 /// Mistakes looked at further.
 const MOST: usize = 3;
 
@@ -308,6 +308,17 @@ fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Opt
     tried.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
+/// The cuts as they are listed, and as they were made where that is another order.
+pub(super) fn sequences(data: &CuttingData) -> Vec<Vec<usize>> {
+    let listed: Vec<usize> = (0..data.cuts.len()).collect();
+    let mut made = listed.clone();
+    made.sort_by_key(|&i| (data.cuts[i].order, i));
+    match made == listed {
+        true => vec![listed],
+        false => vec![listed, made],
+    }
+}
+
 /// Gains to be tried: of single cuts, and switched at some time, in the order of making or in that of the list.
 /// `far_off`: the cuts that stand farthest from the `robust` fit.
 pub(super) fn other_gains(
@@ -316,17 +327,10 @@ pub(super) fn other_gains(
     far_off: &[usize],
 ) -> Vec<OtherGain> {
     let mut found = robust.and_then(single_cuts).unwrap_or_default();
-    let listed: Vec<usize> = (0..data.cuts.len()).collect();
-    let mut made = listed.clone();
-    made.sort_by_key(|&i| (data.cuts[i].order, i));
     for &cut in far_off {
         found.extend(turned_round(data, &[cut]));
     }
-    let mut sequences = vec![listed];
-    if !sequences.contains(&made) {
-        sequences.push(made);
-    }
-    for switched in sequences.iter().filter_map(|s| switched(data, s)) {
+    for switched in sequences(data).iter().filter_map(|s| switched(data, s)) {
         if !found
             .iter()
             .any(|f| f.cuts == switched.cuts && f.channel == switched.channel)

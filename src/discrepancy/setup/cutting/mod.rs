@@ -4,10 +4,12 @@
 //! coefficients a cut can have do not. Another reading of the channels is another `tool_from_dyno`: it is fitted anew, and
 //! those that leave equally little are told apart by their coefficients.
 
+mod axes_of_cuts;
 mod change;
 mod direction;
 mod gain;
 mod plausible;
+mod records;
 mod robust;
 
 use rayon::prelude::*;
@@ -22,10 +24,12 @@ use crate::identify::forces::cutting_study::{NOISE_KNOWN_TO, calibrate_cutting, 
 use crate::identify::{Calibration, CuttingData, CuttingModel};
 use crate::signal::SpindleTrack;
 use crate::text::listed;
-use change::{RecordChange, SPEED_VARIATION, exchanged_files};
+use axes_of_cuts::other_axes;
+use change::{RecordChange, SPEED_VARIATION};
 use direction::milling_direction;
 use gain::other_gains;
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
+use records::ToldByRecords;
 use robust::RobustFit;
 
 /// Cuts that readings of the axes are tried on.
@@ -43,21 +47,12 @@ const CERTAIN: f64 = 0.97;
 /// # Errors
 /// Records that no model can be fitted to.
 pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<SetupCheck> {
-    let mut check = match data.exchanged.is_empty() {
+    let told = ToldByRecords::of(&data.slips);
+    let mut check = match told.spoilt.is_empty() {
         true => examine(data, rival)?,
-        // At speeds that are not theirs the waveforms of these cuts are none.
+        // Waveforms at speeds that are not theirs, or without signs, are none.
         false => SetupCheck {
-            findings: data
-                .exchanged
-                .iter()
-                .map(|cuts| {
-                    exchanged_files(
-                        cuts,
-                        "each ran at the spindle speed stated for the other",
-                        CERTAIN,
-                    )
-                })
-                .collect(),
+            findings: told.spoilt,
             reduced_chi2: 1.0,
             explained_share: 1.0,
             ..SetupCheck::default()
@@ -69,8 +64,9 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
         check.last_taken_out = 1;
     }
     let copied = data.copies.iter().map(copied_record);
-    check.last_taken_out += copied.len();
-    check.findings.extend(copied);
+    let out: Vec<SetupFinding> = copied.chain(told.left_out).collect();
+    check.last_taken_out += out.len();
+    check.findings.extend(out);
     Ok(check)
 }
 
@@ -136,7 +132,9 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     if data.process != Process::Milling {
         let Some(base) = fit(data) else { return Ok(check) };
         if leaves_more_than_noise(&base, data) {
-            try_changes(data, &base, of_some_cuts(data, &base)?, rival, &mut check);
+            let mut changes = vec![RecordChange::DrillDiameter, RecordChange::PointAngle];
+            changes.extend(of_some_cuts(data, &base)?);
+            try_changes(data, &base, changes, rival, &mut check);
         }
         // Turned round in all cuts a channel fits as well; in some of them it does not.
         if !check.findings.iter().any(SetupFinding::is_likely) {
@@ -172,6 +170,7 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
         RecordChange::SpeedWander { steady_in_time: true },
         RecordChange::LowPass { order: 1 },
         RecordChange::LowPass { order: 2 },
+        RecordChange::MovingAverage,
         RecordChange::Width(None),
         RecordChange::Helix,
     ]
@@ -345,13 +344,21 @@ fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChan
         changes.extend(may_be_exchanged.map(|&b| RecordChange::Exchanged([a.min(b), a.max(b)])));
     }
     let gains = other_gains(data, robust.as_ref(), &far_off);
+    if data.process == Process::Milling {
+        let axes = other_axes(data, robust.as_ref(), &far_off);
+        changes.extend(axes.into_iter().map(RecordChange::Axes));
+    }
     doubtful.extend(far_off);
     doubtful.sort_unstable();
     doubtful.dedup();
     for cut in doubtful {
         changes.push(RecordChange::FeedOf(cut));
-        if data.process == Process::Milling {
-            changes.extend([RecordChange::DepthOf(cut), RecordChange::Width(Some(cut))]);
+        match data.process {
+            Process::Milling => changes.extend([RecordChange::DepthOf(cut), RecordChange::Width(Some(cut))]),
+            Process::Drilling => {
+                changes.extend([RecordChange::DrillSpeedOf(cut), RecordChange::PilotOf(cut)])
+            }
+            Process::Turning => {}
         }
     }
     changes.extend(gains.into_iter().map(RecordChange::Gain));
@@ -430,7 +437,7 @@ mod tests {
             ("cut-swap", "cut cut-2 and cut-8", None)
         );
         let mut at_other_speeds = made;
-        at_other_speeds.exchanged = vec![["a".into(), "b".into()]];
+        at_other_speeds.slips.exchanged = vec![["a".into(), "b".into()]];
         assert_eq!(first(&at_other_speeds).place, "cut a and b");
     }
 
@@ -447,6 +454,44 @@ mod tests {
             "{findings:?}"
         );
         approx::assert_relative_eq!(found.value.unwrap(), 0.7, max_relative = 3e-2);
+    }
+
+    const HOLES: [[f64; 2]; 6] = [
+        [0.1, 4.0],
+        [0.15, 3.0],
+        [0.2, 4.0],
+        [0.1, 0.0],
+        [0.2, 0.0],
+        [0.15, 5.0],
+    ];
+
+    #[test]
+    fn a_hole_or_a_drill_that_is_not_as_stated_is_named() {
+        let made = drilled([800.0, 20.0, 500.0, 30.0], &HOLES);
+        assert_eq!(examine_cutting(&made, || None).unwrap().findings, []);
+        let cases: [(CuttingData, &str, &str, f64); 4] = [
+            (
+                made.with_pilot_of(1, 1.0 / 1.5),
+                "pilot-diameter",
+                "cut cut-1",
+                3.0,
+            ),
+            (made.with_feed_of(0, 3.0), "feed-override", "cut cut-0", 1.0 / 3.0),
+            (made.with_drill_diameter(8.5 / 9.5), "tool-diameter", "tool", 9.5),
+            (
+                made.with_point_angle(f64::to_radians(59.0).tan() / f64::to_radians(67.5).tan()),
+                "point-angle",
+                "tool",
+                67.5,
+            ),
+        ];
+        for (listed, kind, place, value) in cases {
+            let findings = examine_cutting(&listed, || None).unwrap().findings;
+            let found = findings.first().unwrap_or_else(|| panic!("{kind}"));
+            assert_eq!((found.kind, found.place.as_str()), (kind, place), "{findings:?}");
+            assert!(found.confidence > 0.9, "{findings:?}");
+            approx::assert_relative_eq!(found.value.unwrap(), value, max_relative = 3e-2);
+        }
     }
 
     #[test]

@@ -101,6 +101,11 @@ pub trait Distortion: Sync + Send {
         1.0
     }
 
+    /// What each line is the mean of: weights, and frequencies beside the line's, rad/s.
+    fn spread(&self, _values: &[f64]) -> Vec<(f64, f64)> {
+        vec![(1.0, 0.0)]
+    }
+
     /// The forces whose responses [`Self::shown`] asks for.
     fn forces(&self) -> Pushed {
         Pushed::AtHit

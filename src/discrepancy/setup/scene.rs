@@ -38,24 +38,29 @@ pub fn predict(model: &StructureModel, theta: &[f64], data: &FrfData, made: Opti
                 theta,
                 block,
                 None,
+                0.0,
                 (&without, Pushed::AlongHit),
                 |k, _, truth| {
                     let frf = &block.frfs[k];
                     curves[k].push(truth.recorded(frf, truth.between(frf.response.axis, frf.reference.axis)));
                 },
             )?;
-            if let Some(m) = made {
-                pass(
-                    model,
-                    theta,
-                    block,
-                    made,
-                    (&with, m.mistake.forces()),
-                    |k, omega, truth| {
-                        let frf = &block.frfs[k];
-                        curves[k].push(truth.recorded(frf, m.mistake.shown(m.values, omega, truth, frf)));
-                    },
-                )?;
+            let spread = made.map(|m| (m, m.mistake.spread(m.values)));
+            for (m, (weight, beside)) in spread
+                .iter()
+                .flat_map(|(m, lines)| lines.iter().map(move |l| (m, l)))
+            {
+                let mut line = vec![0; block.frfs.len()];
+                let own = (&*with, m.mistake.forces());
+                pass(model, theta, block, made, *beside, own, |k, omega, truth| {
+                    let frf = &block.frfs[k];
+                    let shown = truth.recorded(frf, m.mistake.shown(m.values, omega, truth, frf)) * *weight;
+                    match curves[k].get_mut(line[k]) {
+                        Some(sum) => *sum += shown,
+                        None => curves[k].push(shown),
+                    }
+                    line[k] += 1;
+                })?;
             }
             Ok(curves)
         })
@@ -78,6 +83,7 @@ pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -
                 theta,
                 block,
                 None,
+                0.0,
                 (&members, Pushed::AtHit),
                 |k, _, truth| {
                     for a in Axis::ALL {
@@ -103,12 +109,13 @@ pub fn predict_all_axes(model: &StructureModel, theta: &[f64], data: &FrfData) -
 }
 
 /// Sets the model up once for `members` of a block, all with `made` or all without, and shows each line of each, solved for
-/// `forces`.
+/// `forces` at frequencies that lie `beside_rad_per_s` its own.
 fn pass(
     model: &StructureModel,
     theta: &[f64],
     block: &FrfBlock,
     made: Option<Made>,
+    beside_rad_per_s: f64,
     (members, forces): (&[usize], Pushed),
     mut show: impl FnMut(usize, f64, &Truth),
 ) -> Result<()> {
@@ -166,7 +173,8 @@ fn pass(
     pushed.dedup();
     let decay = made.map_or(0.0, |m| m.mistake.decay_per_s(m.values));
     let ratio = made.map_or(1.0, |m| m.mistake.frequency_ratio(m.values));
-    let rates: Vec<Complex64> = block.rates().into_iter().map(|s| s * ratio + decay).collect();
+    let moved = Complex64::new(decay, beside_rad_per_s);
+    let rates: Vec<Complex64> = block.rates().into_iter().map(|s| s * ratio + moved).collect();
     basis.solve_lines(&rates, &pushed, |line, response| {
         for (&k, first) in members.iter().zip(&firsts) {
             let truth = Truth {

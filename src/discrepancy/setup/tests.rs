@@ -141,7 +141,7 @@ fn mistakes_are_found_with_their_size() {
     };
     let tau = std::f64::consts::TAU;
     // Index among the mistakes, where, sizes, kind, value told.
-    let cases: [(usize, FrfGroup, &[f64], &str, f64); 10] = [
+    let cases: [(usize, FrfGroup, &[f64], &str, f64); 11] = [
         (2, at(None), &[0.8], "encoder-offset", 0.8),
         (4, at(Some(1)), &[-2.0], "encoder-offset", -2.0),
         (7, at(None), &[0.03, -0.02, 0.01], "point-position", 37.42),
@@ -151,6 +151,7 @@ fn mistakes_are_found_with_their_size() {
         (12, at(None), &[tau], "sensor-high-pass", 1.0),
         (16, at(None), &[3.0], "sensor-mass", 3.0),
         (17, at(Some(1)), &[8e-4], "late-channel", 0.8),
+        (18, at(None), &[0.0625], "coarse-lines", 0.25),
         (
             15,
             at(Some(1)),

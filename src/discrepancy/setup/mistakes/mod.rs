@@ -2,6 +2,7 @@
 
 mod amplifier_low_pass;
 pub(super) mod channel_gain;
+mod coarse_lines;
 pub(super) mod encoder_offset;
 mod exponential_window;
 mod frequency_axis;
@@ -42,6 +43,7 @@ pub fn all(model: &StructureModel, data: &FrfData) -> Vec<Box<dyn Mistake>> {
     }
     all.push(Box::new(sensor_mass::SensorMass));
     all.push(Box::new(late_channel::LateChannel));
+    all.push(Box::new(coarse_lines::CoarseLines));
     for power in [2, 1, 0] {
         all.push(Box::new(frequency_axis::FrequencyAxis { power }));
     }

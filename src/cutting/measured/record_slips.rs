@@ -75,7 +75,9 @@ impl RecordSlips {
             Some(_) => Vec::new(),
             None => other_speed(records),
         };
-        other_speed.retain(|found| !is_exchanged(&found.cut));
+        let no_cutting = no_cutting(trials, records);
+        // Where nothing is cut no line is that of teeth.
+        other_speed.retain(|found| !is_exchanged(&found.cut) && !no_cutting.contains(&found.cut));
         let rectified = records.iter().filter_map(|record| {
             let own = record.channels.iter().filter(|c| c.whole.is_rectified);
             let channels: Vec<String> = own.map(|c| c.axis.label().to_string()).collect();
@@ -85,7 +87,7 @@ impl RecordSlips {
             })
         });
         RecordSlips {
-            no_cutting: no_cutting(trials, records),
+            no_cutting,
             rectified: rectified.collect(),
             count: records.len(),
             exchanged,
@@ -284,7 +286,10 @@ fn no_cutting(trials: &CuttingTrials, records: &[&CutAnalysis]) -> Vec<String> {
             let expected = per_chip(c.axis) * chip_mm2(trials, record).min(largest_chip);
             let is_seen =
                 in_air(c.axis).is_some_and(|std| expected > WOULD_BE_SEEN * std) && expected.is_finite();
-            is_seen && (record.process == Process::Milling || is_at_zero(c, &cuts, expected))
+            is_seen
+                && (record.process == Process::Milling
+                    || outlasts_its_hole(trials, record)
+                    || is_at_zero(c, &cuts, expected))
         })
     };
     like_air
@@ -307,6 +312,16 @@ fn chip_mm2(trials: &CuttingTrials, record: &CutAnalysis) -> f64 {
         Process::Milling | Process::Turning => depth_mm(geometry).unwrap_or(1.0),
     };
     depth * feed_mm(geometry)
+}
+
+/// Whether a record of a drilled hole is longer than the hole takes: then the force begins or ends in it.
+fn outlasts_its_hole(trials: &CuttingTrials, record: &CutAnalysis) -> bool {
+    let is_drilled = record.process == Process::Drilling;
+    let Some(depth) = depth_mm(&trials.cuts[record.cut].geometry).filter(|_| is_drilled) else {
+        return false;
+    };
+    let hole_s = depth / (record.feed_mm * record.spindle_rpm / 60.0);
+    record.record_s[1] - record.record_s[0] > hole_s
 }
 
 /// Whether a channel stays where the others have their zero, as far as `expected` matters.

@@ -226,7 +226,13 @@ mod tests {
             to.swap(a, b);
             Turn { to, sign }
         };
-        let all: [(&[usize], Turn, &str); 4] = [
+        let all: [(&[usize], Turn, &str); 5] = [
+            // A quarter of a turn, which looks like the other way of milling.
+            (
+                &[3],
+                swapped(0, 1, [-1.0, 1.0, 1.0]),
+                "cut cut-3: Fx is in truth −Fy, Fy is in truth Fx",
+            ),
             (
                 &[6],
                 swapped(0, 1, [1.0; 3]),

@@ -100,12 +100,14 @@ impl RecordChange {
             }
             RecordChange::MovingAverage => {
                 for cut in &mut own.cuts {
-                    let half_turns = std::f64::consts::PI * cut.spindle_hz() * value;
+                    // Half the angle by which order 1 goes on from sample to sample.
+                    let half_step = std::f64::consts::PI * cut.spindle_hz() / cut.sample_rate_hz;
+                    let count = (value * cut.sample_rate_hz).max(1.0);
                     for channel in Arc::make_mut(cut).channels.iter_mut().flatten() {
                         let lines = channel.orders.iter_mut().zip(&mut channel.order_std);
                         for (k, (line, std)) in lines.enumerate() {
-                            let x = (k + 1) as f64 * half_turns;
-                            let left = if x > 0.0 { x.sin() / x } else { 1.0 };
+                            let x = (k + 1) as f64 * half_step;
+                            let left = (count * x).sin() / (count * x.sin());
                             // Where whole periods were averaged nothing is left that could be brought back.
                             let left = left.abs().max(1e-3).copysign(left);
                             *line /= left;
@@ -412,8 +414,23 @@ impl RecordChange {
                 RecordChange::Exchanged(_) => (data.cuts.len() * data.cuts.len()) as f64,
                 _ => 4.0,
             },
-            at_bound: false,
+            at_bound: self.leaves_no_lip(data, value),
         })
+    }
+
+    /// A pilot hole so wide that nobody drills it.
+    fn leaves_no_lip(&self, data: &CuttingData, value: f64) -> bool {
+        /// Part of the drill's radius.
+        const WIDEST: f64 = 0.9;
+        let RecordChange::PilotOf(cut) = self else {
+            return false;
+        };
+        match &data.cuts[*cut].kind {
+            CutKind::Drilling { cut, .. } => {
+                value.exp() * cut.geometry.inner_radius_mm > WIDEST * cut.geometry.radius_mm
+            }
+            CutKind::Milling { .. } | CutKind::Turning { .. } => false,
+        }
     }
 }
 

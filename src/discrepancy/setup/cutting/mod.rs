@@ -152,6 +152,11 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     let found = [milling_direction(data, base.as_ref().ok()), dyno_axes(data)?];
     let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((finding, left)) = least {
+        // Channels in another order in some cuts look like another reading of some or all, which leaves more.
+        let (finding, left) = match left < SUSPICIOUS {
+            true => (finding, left),
+            false => axes_of_some_cuts(data, left)?.unwrap_or((finding, left)),
+        };
         check.explained_share = 1.0;
         check.reduced_chi2 = left;
         check.findings.push(finding);
@@ -183,6 +188,31 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
 /// Whether the fitted model leaves more than noise.
 fn leaves_more_than_noise(base: &Calibration, data: &CuttingData) -> bool {
     base.reduced_chi2 >= SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64)
+}
+
+/// Channels in another order in some cuts, where that leaves much less than `left`; with what it leaves.
+fn axes_of_some_cuts(data: &CuttingData, left: f64) -> Result<Option<(SetupFinding, f64)>> {
+    if data.cuts.len() < FEWEST_CUTS {
+        return Ok(None);
+    }
+    let robust = RobustFit::of(data);
+    let all = || (0..data.cuts.len()).collect();
+    let far_off = match &robust {
+        Some(robust) => worst_cuts(&robust.even, &robust.theta, all())?,
+        None => Vec::new(),
+    };
+    let tried = other_axes(data, robust.as_ref(), &far_off)
+        .into_iter()
+        .filter_map(|axes| {
+            let left = fit(&axes.undone(data))?.reduced_chi2;
+            let finding = SetupFinding {
+                confidence: CERTAIN,
+                ..axes.finding(data)
+            };
+            Some((finding, left))
+        });
+    let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
+    Ok(best.filter(|(_, own)| *own < MUCH_BETTER * left))
 }
 
 /// Adds what `changes` explain of the misfit that the fitted model (`base`) has.

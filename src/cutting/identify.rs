@@ -13,7 +13,7 @@ use crate::cutting::force_model::force_axis::ForceAxis;
 use crate::cutting::force_model::orthogonal::{OrthogonalPrediction, predict};
 use crate::cutting::measured::average::pool_scatter;
 use crate::cutting::measured::cut_analysis::{Average, CutAnalysis};
-use crate::data::{CutGeometry, Process};
+use crate::data::Process;
 use crate::{Error, InputError, Result};
 
 /// What the dynamometer records say.
@@ -268,14 +268,5 @@ impl CfcResult {
             .iter()
             .find(|c| c.cut == cut)
             .and_then(|c| c.averages[axis.index()])
-    }
-}
-
-/// Depth that a cut is known by: axial depth (milling), hole depth (drilling), depth of cut (turning), mm.
-pub fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
-    match *geometry {
-        CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
-        CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
-        CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
     }
 }

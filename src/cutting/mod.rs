@@ -24,7 +24,9 @@ pub use fit::outlier::{CutMisfit, misfits, studentized};
 pub use fit::regression::{CoefficientFit, Observation, fit};
 pub use fit::series::{MaterialComparison, SpeedTrends};
 pub use fit::trend::{ChangeReading, CoefficientChange, table_trend};
-pub use force_model::average_force::{average_row, cut_diameter_mm, cutting_speed_m_per_min, feed_mm};
+pub use force_model::average_force::{
+    average_row, cut_diameter_mm, cutting_speed_m_per_min, depth_mm, feed_mm,
+};
 pub use force_model::coefficients::{
     CoefficientKind, DRILLING_COEFFICIENTS, MILLING_COEFFICIENTS, coefficients_of,
 };
@@ -36,7 +38,6 @@ pub use force_model::force_axis::ForceAxis;
 pub use force_model::orthogonal::{ObliqueCoefficients, ObliqueEdge, OrthogonalPrediction};
 pub use force_model::turning::{EdgeBit, edge_row, engaged_edge};
 pub use force_model::twist_drill::{LipPlace, TwistDrill};
-pub use identify::depth_mm;
 pub(crate) use identify::none_usable;
 pub use identify::{CfcResult, fit_force_coefficients};
 #[cfg(test)]

@@ -105,6 +105,15 @@ pub fn feed_mm(geometry: &CutGeometry) -> f64 {
     }
 }
 
+/// Depth that a cut is known by: axial depth (milling), hole depth (drilling), depth of cut (turning), mm.
+pub fn depth_mm(geometry: &CutGeometry) -> Option<f64> {
+    match *geometry {
+        CutGeometry::Milling { axial_depth_mm, .. } => Some(axial_depth_mm),
+        CutGeometry::Drilling { hole_depth_mm, .. } => hole_depth_mm,
+        CutGeometry::Turning { depth_of_cut_mm, .. } => Some(depth_of_cut_mm),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,9 +2,8 @@
 //! fitted: no cut in a record, another spindle speed or number of teeth, exchanged files, lost signs.
 
 use crate::cutting::cutting_trials::CuttingTrials;
-use crate::cutting::force_model::average_force::feed_mm;
+use crate::cutting::force_model::average_force::{depth_mm, feed_mm};
 use crate::cutting::force_model::force_axis::ForceAxis;
-use crate::cutting::identify::depth_mm;
 use crate::cutting::measured::cut_analysis::{ChannelAnalysis, CutAnalysis};
 use crate::data::Process;
 use crate::signal::median;

@@ -332,7 +332,7 @@ fn another_frequency_axis_is_found_with_its_ratio() {
 fn mistyped_angles_are_found() {
     let model = model();
     let data = measured(&model, None, 5);
-    let typed = |turns: &dyn Fn(&[f64]) -> Vec<(usize, f64)>| {
+    let typed = |turns: fn(&[f64]) -> [(usize, f64); 2]| {
         let mut data = data.clone();
         let block = Arc::make_mut(&mut data.blocks[2]);
         let angles_rad = block.kinematics.joint_angles_rad(&model.robot.spec);
@@ -343,12 +343,12 @@ fn mistyped_angles_are_found() {
         let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
         (found.kind, found.place.clone(), found.value)
     };
-    let exchanged = typed(&|q| vec![(2, q[2] - q[1]), (3, q[1] - q[2])]);
+    let exchanged = typed(|q| [(2, q[2] - q[1]), (3, q[1] - q[2])]);
     assert_eq!(
         exchanged,
         ("joint-angles", "joints 2 and 3, posture c".into(), None)
     );
-    let (kind, place, value) = typed(&|q| vec![(1, -0.9 * q[0])]);
+    let (kind, place, value) = typed(|q| [(1, -0.9 * q[0]), (2, 0.0)]);
     assert_eq!((kind, place.as_str()), ("encoder-offset", "joint 1, posture c"));
     let right = data.blocks[2].kinematics.joint_angles_rad(&model.robot.spec)[0];
     assert!(

@@ -29,7 +29,7 @@ use change::{RecordChange, SPEED_VARIATION};
 use direction::milling_direction;
 use gain::other_gains;
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
-use records::ToldByRecords;
+use records::{CERTAIN, ToldByRecords};
 use robust::RobustFit;
 
 /// Cuts that readings of the axes are tried on.
@@ -38,8 +38,6 @@ const CUTS: usize = 4;
 const FEWEST_CUTS: usize = 4;
 /// Readings that leave no more than this times the least are equal.
 const ALIKE: f64 = 1.1;
-/// Confidence in what was read off the records themselves.
-const CERTAIN: f64 = 0.97;
 
 /// The dynamometer's axes first, for nothing else can be judged before; then gain and filter of the channels. Last what was taken out
 /// while the records were read.

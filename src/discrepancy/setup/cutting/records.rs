@@ -1,11 +1,12 @@
 //! What was read off the records themselves, before anything was fitted, as findings.
 
-use super::CERTAIN;
 use super::change::exchanged_files;
 use crate::cutting::{CommonPassing, OtherSpeed, RecordSlips, Rectified};
 use crate::discrepancy::setup::finding::SetupFinding;
 use crate::text::listed;
 
+/// Confidence in what was read off the records themselves.
+pub(super) const CERTAIN: f64 = 0.97;
 /// Confidence in a number of teeth: another sampling rate, or another speed in all cuts, by the ratio of two whole numbers is rarer.
 const TEETH: f64 = 0.9;
 

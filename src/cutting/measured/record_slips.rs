@@ -257,8 +257,11 @@ fn no_cutting(trials: &CuttingTrials, records: &[&CutAnalysis]) -> Vec<String> {
                 .iter()
                 .filter(|c| ForceAxis::of(record.process).contains(&c.axis))
         };
+        // A cut in another unit or range is as quiet, or quieter, and yet far above its own air.
         let is_air = |c: &ChannelAnalysis| {
-            in_air(c.axis).is_some_and(|std| std > 0.0 && c.whole.std <= LIKE_AIR * std)
+            let usual = in_air(c.axis).filter(|std| *std > 0.0);
+            let alike = usual.is_some_and(|std| (std / LIKE_AIR..=LIKE_AIR * std).contains(&c.whole.std));
+            alike && c.whole.air_std.is_none_or(|own| c.whole.std <= LIKE_AIR * own)
         };
         carrying().count() > 0 && carrying().all(is_air)
     };

@@ -67,7 +67,7 @@ const ALIKE: f64 = 0.01;
 impl RecordSlips {
     /// `records`: of one process.
     pub fn of(trials: &CuttingTrials, records: &[&CutAnalysis]) -> Self {
-        let exchanged = exchanged(trials, records);
+        let exchanged = exchanged(records);
         let is_exchanged = |id: &String| exchanged.iter().flatten().any(|other| other == id);
         let common_passing = common_passing(trials, records);
         let mut other_speed = match common_passing {
@@ -95,6 +95,11 @@ impl RecordSlips {
         }
     }
 
+    /// Whether records without signs are a matter of single cuts.
+    pub fn few_are_rectified(&self) -> bool {
+        2 * self.rectified.len() < self.count
+    }
+
     /// Cuts that say nothing as they stand, each with what is wrong and what to do. What is wrong with half of all cuts or more is
     /// no matter of single ones.
     pub fn left_out(&self) -> Vec<(&str, String, String)> {
@@ -115,7 +120,7 @@ impl RecordSlips {
             );
             (found.cut.as_str(), why, found.remedy())
         }));
-        if 2 * self.rectified.len() < self.count {
+        if self.few_are_rectified() {
             all.extend(self.rectified.iter().map(|found| {
                 let why = format!(
                     "absolute values stand in {} of its record",
@@ -146,17 +151,18 @@ impl OtherSpeed {
     }
 }
 
+/// The speed that a clear line of the teeth shows, where it is not the stated one, 1/min.
+fn ran_rpm(record: &CutAnalysis) -> Option<f64> {
+    record.tooth_line.filter(|line| line.speed_is_doubtful())?;
+    Some(record.passes_times? * record.spindle_rpm)
+}
+
 /// Cuts of which each shows the speed stated for the other.
-fn exchanged(trials: &CuttingTrials, records: &[&CutAnalysis]) -> Vec<[String; 2]> {
-    let teeth = trials.tool.teeth.max(1) as f64;
+fn exchanged(records: &[&CutAnalysis]) -> Vec<[String; 2]> {
     let is_near = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
     let at_odds: Vec<(&CutAnalysis, f64)> = records
         .iter()
-        .filter_map(|record| {
-            let line = record.tooth_line.as_ref()?;
-            line.speed_is_doubtful()
-                .then_some((*record, 60.0 * line.tooth_hz / teeth))
-        })
+        .filter_map(|record| Some((*record, ran_rpm(record)?)))
         .collect();
     let mut pairs = Vec::new();
     for (n, (a, ran_a)) in at_odds.iter().enumerate() {
@@ -177,12 +183,11 @@ fn other_speed(records: &[&CutAnalysis]) -> Vec<OtherSpeed> {
     let found: Vec<OtherSpeed> = records
         .iter()
         .filter_map(|record| {
-            record.tooth_line.filter(|line| line.speed_is_doubtful())?;
-            let ratio = record.passes_times?;
-            ((ratio / HALF - 1.0).abs() > ALIKE).then(|| OtherSpeed {
+            let ran_rpm = ran_rpm(record)?;
+            ((ran_rpm / (HALF * record.spindle_rpm) - 1.0).abs() > ALIKE).then(|| OtherSpeed {
                 cut: record.id.clone(),
                 stated_rpm: record.spindle_rpm,
-                ran_rpm: ratio * record.spindle_rpm,
+                ran_rpm,
                 feed_mm: record.feed_mm,
             })
         })

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::gain::{AFTER, BEFORE, STEPS, sequences};
 use super::plausible::{IMPLAUSIBLE, fit, improbability};
 use super::robust::RobustFit;
+use super::sequence::{sequences, switch};
 use crate::discrepancy::setup::finding::SetupFinding;
 use crate::discrepancy::setup::readings::Turn;
 use crate::identify::{CuttingData, CuttingModel, CuttingProblem};
@@ -141,18 +141,7 @@ fn of_single_cuts(robust: &RobustFit, cut: usize) -> Option<OtherAxes> {
 
 /// Another order from some cut of a sequence on, by the first and the last cut after that.
 fn switched(data: &CuttingData, sequence: &[usize]) -> Option<OtherAxes> {
-    let last = sequence.len().checked_sub(AFTER)?;
-    let step = sequence.len().div_ceil(STEPS);
-    let best = |places: Vec<usize>| {
-        places
-            .into_par_iter()
-            .filter_map(|at| Some((at, switched_at(data, sequence.split_at_checked(at)?)?)))
-            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
-    };
-    let (at, coarse) = best((BEFORE..=last).step_by(step).collect())?;
-    let beside = (at + 1).saturating_sub(step).max(BEFORE)..=(at + step - 1).min(last);
-    let fine = best(beside.filter(|other| *other != at).collect());
-    let (at, (turn, _)) = fine.filter(|fine| fine.1.1 < coarse.1).unwrap_or((at, coarse));
+    let (at, turn) = switch(sequence, |before, after| switched_at(data, before, after))?;
     let (before, after) = sequence.split_at_checked(at)?;
     let sorted = |cuts: &[usize]| {
         let mut cuts = cuts.to_vec();
@@ -186,7 +175,7 @@ fn inverse(turn: Turn) -> Turn {
 }
 
 /// The best order after a place, and what part of their misfit it leaves the first and the last cut there.
-fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Option<(Turn, f64)> {
+fn switched_at(data: &CuttingData, before: &[usize], after: &[usize]) -> Option<(Turn, f64)> {
     let base = fit(&data.filtered(|i| before.contains(&i)))?;
     let looked_at = [*after.first()?, *after.last()?];
     let left = |turn: Turn| -> Option<f64> {

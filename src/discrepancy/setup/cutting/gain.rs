@@ -3,10 +3,9 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::plausible::fit;
 use super::robust::RobustFit;
+use super::sequence::{sequences, switch};
 use crate::discrepancy::setup::finding::{SetupFinding, with_error};
 use crate::identify::forces::cutting_data::CutData;
 use crate::identify::{CutFit, CuttingData, CuttingModel, CuttingProblem};
@@ -24,11 +23,6 @@ const CERTAIN: f64 = 0.1;
 const ALIKE: f64 = 0.1;
 /// A channel with less of its force than this has none of it.
 const NONE_OF_IT: f64 = 0.03;
-/// Cuts before and after a switch, at least.
-pub(super) const BEFORE: usize = 3;
-pub(super) const AFTER: usize = 2;
-/// Places in a sequence at which a switch is looked for first.
-pub(super) const STEPS: usize = 24;
 /// Mistakes looked at further.
 const MOST: usize = 3;
 
@@ -267,28 +261,8 @@ fn turned_round(data: &CuttingData, cuts: &[usize]) -> impl Iterator<Item = Othe
     })
 }
 
-/// A gain that is another one from some cut of a sequence on: looked for in steps, then one by one.
-fn switched(data: &CuttingData, sequence: &[usize]) -> Option<OtherGain> {
-    let last = sequence.len().checked_sub(AFTER)?;
-    let step = sequence.len().div_ceil(STEPS);
-    let best = |places: Vec<usize>| {
-        places
-            .into_par_iter()
-            .filter_map(|at| Some((at, switched_at(data, sequence.split_at_checked(at)?)?)))
-            .min_by(|a, b| a.1.1.total_cmp(&b.1.1))
-    };
-    let (at, coarse) = best((BEFORE..=last).step_by(step).collect())?;
-    let beside = (at + 1).saturating_sub(step).max(BEFORE)..=(at + step - 1).min(last);
-    let fine = best(beside.filter(|other| *other != at).collect());
-    let (found, _) = fine
-        .map(|f| f.1)
-        .filter(|fine| fine.1 < coarse.1)
-        .unwrap_or(coarse);
-    Some(found)
-}
-
 /// The gain of the cuts `after` against those `before`, and the misfit per value that is left with it.
-fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Option<(OtherGain, f64)> {
+fn switched(data: &CuttingData, before: &[usize], after: &[usize]) -> Option<(OtherGain, f64)> {
     let base = fit(&data.filtered(|i| before.contains(&i)))?;
     let gains = gains(data, &base.theta)?;
     let of_channel = |i: usize| {
@@ -308,17 +282,6 @@ fn switched_at(data: &CuttingData, (before, after): (&[usize], &[usize])) -> Opt
     tried.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The cuts as they are listed, and as they were made where that is another order.
-pub(super) fn sequences(data: &CuttingData) -> Vec<Vec<usize>> {
-    let listed: Vec<usize> = (0..data.cuts.len()).collect();
-    let mut made = listed.clone();
-    made.sort_by_key(|&i| (data.cuts[i].order, i));
-    match made == listed {
-        true => vec![listed],
-        false => vec![listed, made],
-    }
-}
-
 /// Gains to be tried: of single cuts, and switched at some time, in the order of making or in that of the list.
 /// `far_off`: the cuts that stand farthest from the `robust` fit.
 pub(super) fn other_gains(
@@ -330,7 +293,8 @@ pub(super) fn other_gains(
     for &cut in far_off {
         found.extend(turned_round(data, &[cut]));
     }
-    for switched in sequences(data).iter().filter_map(|s| switched(data, s)) {
+    let of_sequence = |cuts: &Vec<usize>| switch(cuts, |before, after| switched(data, before, after));
+    for (_, switched) in sequences(data).iter().filter_map(of_sequence) {
         if !found
             .iter()
             .any(|f| f.cuts == switched.cuts && f.channel == switched.channel)

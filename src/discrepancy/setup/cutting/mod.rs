@@ -11,6 +11,7 @@ mod gain;
 mod plausible;
 mod records;
 mod robust;
+mod sequence;
 
 use rayon::prelude::*;
 
@@ -194,11 +195,7 @@ fn axes_of_some_cuts(data: &CuttingData, left: f64) -> Result<Option<(SetupFindi
         return Ok(None);
     }
     let robust = RobustFit::of(data);
-    let all = || (0..data.cuts.len()).collect();
-    let far_off = match &robust {
-        Some(robust) => worst_cuts(&robust.even, &robust.theta, all())?,
-        None => Vec::new(),
-    };
+    let far_off = far_off(robust.as_ref())?;
     let tried = other_axes(data, robust.as_ref(), &far_off)
         .into_iter()
         .filter_map(|axes| {
@@ -353,18 +350,21 @@ fn drilling_signs(calibration: &Calibration) -> Vec<SetupFinding> {
     turned.collect()
 }
 
+/// The cuts that stand farthest from a fit that they do not lead astray.
+fn far_off(robust: Option<&RobustFit>) -> Result<Vec<usize>> {
+    robust.map_or(Ok(Vec::new()), |robust| {
+        worst_cuts(&robust.even, &robust.theta, (0..robust.even.cuts.len()).collect())
+    })
+}
+
 /// What may be wrong with single cuts, or with some of them together: feed, depth or width, exchanged files, another gain.
 fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChange>> {
     if data.cuts.len() < FEWEST_CUTS {
         return Ok(Vec::new());
     }
-    let all = || (0..data.cuts.len()).collect();
     let robust = RobustFit::of(data);
-    let mut doubtful = worst_cuts(data, &base.theta, all())?;
-    let far_off = match &robust {
-        Some(robust) => worst_cuts(&robust.even, &robust.theta, all())?,
-        None => Vec::new(),
-    };
+    let mut doubtful = worst_cuts(data, &base.theta, (0..data.cuts.len()).collect())?;
+    let far_off = far_off(robust.as_ref())?;
     let mut changes: Vec<RecordChange> = Vec::new();
     for (n, &a) in far_off.iter().enumerate() {
         let others = far_off[n + 1..].iter();

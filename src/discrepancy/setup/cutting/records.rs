@@ -1,7 +1,7 @@
 //! What was read off the records themselves, before anything was fitted, as findings.
 
 use super::change::exchanged_files;
-use crate::cutting::{CommonPassing, OtherSpeed, RecordSlips, Rectified};
+use crate::cutting::{CommonPassing, OtherSpeed, RecordSlips};
 use crate::discrepancy::setup::finding::SetupFinding;
 use crate::text::listed;
 
@@ -29,8 +29,8 @@ impl ToldByRecords {
             .collect();
         let mut left_out: Vec<SetupFinding> = slips.no_cutting.iter().map(|id| no_cutting(id)).collect();
         left_out.extend(slips.other_speed.iter().map(other_speed));
-        let rectified = rectified(&slips.rectified, slips.count);
-        match 2 * slips.rectified.len() < slips.count {
+        let rectified = rectified(slips);
+        match slips.few_are_rectified() {
             true => left_out.extend(rectified),
             false => spoilt.extend(rectified),
         }
@@ -104,7 +104,8 @@ fn common(found: &CommonPassing) -> SetupFinding {
 }
 
 /// Cuts with the same channels are told together.
-fn rectified(found: &[Rectified], count: usize) -> Vec<SetupFinding> {
+fn rectified(slips: &RecordSlips) -> Vec<SetupFinding> {
+    let found = &slips.rectified;
     let mut groups: Vec<(Vec<String>, Vec<String>)> = Vec::new();
     for own in found {
         match groups.iter_mut().find(|(channels, _)| *channels == own.channels) {
@@ -113,14 +114,14 @@ fn rectified(found: &[Rectified], count: usize) -> Vec<SetupFinding> {
         }
     }
     // In all cuts it is one mistake, whichever channels go through zero in one or the other.
-    if 2 * found.len() >= count && groups.len() > 1 {
+    if !slips.few_are_rectified() && groups.len() > 1 {
         let mut channels: Vec<String> = found.iter().flat_map(|own| own.channels.clone()).collect();
         channels.sort_unstable();
         channels.dedup();
         groups = vec![(channels, found.iter().map(|own| own.cut.clone()).collect())];
     }
     let finding = |(channels, cuts): (Vec<String>, Vec<String>)| {
-        let place = match cuts.len() == count {
+        let place = match cuts.len() == slips.count {
             true => "all cuts".to_string(),
             false => format!("cut {}", listed(&cuts)),
         };
@@ -139,6 +140,7 @@ fn rectified(found: &[Rectified], count: usize) -> Vec<SetupFinding> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cutting::Rectified;
     use crate::discrepancy::setup::examine_cutting;
     use crate::identify::forces::made_cuts::ten_hard_cuts;
 

@@ -11,12 +11,11 @@ use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
 
 /// The files of a posture hold another frequency axis than they were measured on: another sampling rate or span was written down.
-/// ln(true frequency over that of the file).
-pub struct FrequencyAxis {
-    /// Derivatives of the displacement that the file holds: 2 where it is accelerance. The reader divides by (iω)^power.
-    pub power: i32,
-}
+/// ln(true frequency over that of the file), and ln of what the receptance comes out too large by for it.
+pub struct FrequencyAxis;
 
+/// Derivatives of the displacement that a file holds (2: accelerance): the reader divides by (iω)^power, and so by the wrong ω.
+const POWERS: [f64; 3] = [2.0, 1.0, 0.0];
 /// ln of the smallest ratio that is a mistake of the axis: clocks are right to 1e-4, and what shifts modes by a few per cent is physics.
 const LEAST: f64 = 0.05;
 /// ln of the largest that is looked for …
@@ -35,13 +34,16 @@ impl Distortion for FrequencyAxis {
     }
 
     fn shown(&self, values: &[f64], _omega: f64, truth: &Truth, frf: &FrfDatum) -> Complex64 {
-        truth.between(frf.response.axis, frf.reference.axis) * (f64::from(self.power) * values[0]).exp()
+        truth.between(frf.response.axis, frf.reference.axis) * values[1].exp()
     }
 }
 
 impl Mistake for FrequencyAxis {
     fn sizes(&self) -> Vec<MistakeSize> {
-        vec![MistakeSize::either_way(0.4, 1.2)]
+        vec![
+            MistakeSize::either_way(0.4, 1.2),
+            MistakeSize::either_way(1.0, 2.5),
+        ]
     }
 
     /// That of all postures would be another stiffness.
@@ -61,40 +63,31 @@ impl Mistake for FrequencyAxis {
             return Ok(Vec::new());
         }
         let apart = apart(model, data, theta)?;
-        let wrong = data.filtered(|p| apart.iter().any(|(posture, _)| *posture == p));
+        let wrong = data.filtered(|p| apart.iter().any(|own| own.posture == p));
         if wrong.blocks.is_empty() {
             return Ok(Vec::new());
         }
         let steps = (MOST / COARSE).round() as i32;
         let coarse = (-steps..=steps).map(|k| f64::from(k) * COARSE);
-        let mut best: Vec<(f64, f64)> = apart.iter().map(|(_, now)| (0.0, *now)).collect();
-        self.nearer(model, &wrong, theta, coarse, &apart, &mut best)?;
+        let mut best = apart.clone();
+        nearer(model, &wrong, theta, coarse, &mut best)?;
         let mut found = Vec::new();
-        for ((posture, now), mut best) in apart.iter().copied().zip(best) {
-            if best.1 > LEFT * now || best.0.abs() < LEAST {
+        for (own, best) in apart.iter().zip(best) {
+            if best.distance > LEFT * own.distance || best.log.abs() < LEAST {
                 continue;
             }
-            let own = wrong.filtered(|p| p == posture);
-            let fine = (-10..=10)
-                .map(|k| best.0 + f64::from(k) * FINE)
-                .collect::<Vec<_>>();
-            let mut bests = [best];
-            self.nearer(
-                model,
-                &own,
-                theta,
-                fine.into_iter(),
-                &[(posture, now)],
-                &mut bests,
-            )?;
-            best = bests[0];
+            let files = wrong.filtered(|p| p == own.posture);
+            let fine = (-10..=10).map(|k| best.log + f64::from(k) * FINE);
+            let mut best = [best];
+            nearer(model, &files, theta, fine, &mut best)?;
+            let [best] = best;
             found.push(Score {
                 group: FrfGroup {
-                    posture: Some(posture),
+                    posture: Some(own.posture),
                     ..FrfGroup::ALL
                 },
-                gain: now - best.1,
-                values: vec![best.0],
+                gain: own.distance - best.distance,
+                values: vec![best.log, best.power * best.log],
             });
         }
         Ok(found)
@@ -119,54 +112,79 @@ impl Mistake for FrequencyAxis {
     }
 }
 
-impl FrequencyAxis {
-    /// Keeps in `best` (ln of the ratio, distance) what brings each posture of `apart` nearer.
-    fn nearer(
-        &self,
-        model: &StructureModel,
-        data: &FrfData,
-        theta: &[f64],
-        logs: impl Iterator<Item = f64>,
-        apart: &[(usize, f64)],
-        best: &mut [(f64, f64)],
-    ) -> Result<()> {
-        for log in logs {
-            let mut stretched = data.clone();
-            for block in &mut stretched.blocks {
-                let block = std::sync::Arc::make_mut(block);
-                block.frequency_hz.iter_mut().for_each(|f| *f *= log.exp());
-            }
-            let size = (f64::from(self.power) * log).exp();
-            let mut distances = vec![0.0; apart.len()];
-            for ((_, frf), curve) in data.frfs().zip(predict(model, theta, &stretched, None)?) {
-                if let Some(i) = apart.iter().position(|(p, _)| *p == frf.posture) {
-                    distances[i] += distance(curve.into_iter().map(|m| m * size), frf);
-                }
-            }
-            for (best, distance) in best.iter_mut().zip(distances) {
-                if distance < best.1 {
-                    *best = (log, distance);
-                }
-            }
-        }
-        Ok(())
-    }
+/// A posture's files on another axis.
+#[derive(Clone, Copy)]
+struct Tried {
+    posture: usize,
+    /// ln of true frequency over that of the file.
+    log: f64,
+    /// Of [`POWERS`].
+    power: f64,
+    distance: f64,
 }
 
-/// Postures whose FRFs the model does not meet at all, with the distance.
-fn apart(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<(usize, f64)>> {
-    let curves = predict(model, theta, data, None)?;
-    let mut all: Vec<(usize, f64, usize)> = data
-        .measured_postures()
-        .into_iter()
-        .map(|p| (p, 0.0, 0))
-        .collect();
-    for ((_, frf), curve) in data.frfs().zip(&curves) {
-        if let Some((_, sum, lines)) = all.iter_mut().find(|(p, _, _)| *p == frf.posture) {
-            *sum += distance(curve.iter().copied(), frf);
-            *lines += curve.len();
+/// Keeps in `best` what brings each posture nearer, of the axes whose ln of the ratio is one of `logs`.
+fn nearer(
+    model: &StructureModel,
+    data: &FrfData,
+    theta: &[f64],
+    logs: impl Iterator<Item = f64>,
+    best: &mut [Tried],
+) -> Result<()> {
+    for log in logs {
+        let mut stretched = data.clone();
+        for block in &mut stretched.blocks {
+            let block = std::sync::Arc::make_mut(block);
+            block.frequency_hz.iter_mut().for_each(|f| *f *= log.exp());
+        }
+        let curves = predict(model, theta, &stretched, None)?;
+        for best in best.iter_mut() {
+            for power in POWERS {
+                let size = (power * log).exp();
+                let own = data
+                    .frfs()
+                    .zip(&curves)
+                    .filter(|((_, frf), _)| frf.posture == best.posture);
+                let distance = own
+                    .map(|((_, frf), curve)| distance(curve.iter().map(|m| m * size), frf))
+                    .sum();
+                if distance < best.distance {
+                    *best = Tried {
+                        log,
+                        power,
+                        distance,
+                        ..*best
+                    };
+                }
+            }
         }
     }
-    all.retain(|(_, sum, lines)| *sum > APART * *lines as f64);
-    Ok(all.into_iter().map(|(p, sum, _)| (p, sum)).collect())
+    Ok(())
+}
+
+/// Postures whose FRFs the model does not meet at all.
+fn apart(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<Vec<Tried>> {
+    let curves = predict(model, theta, data, None)?;
+    let of_posture = |posture: usize| {
+        let own = || {
+            data.frfs()
+                .zip(&curves)
+                .filter(move |((_, frf), _)| frf.posture == posture)
+        };
+        let lines: usize = own().map(|(_, curve)| curve.len()).sum();
+        let distance: f64 = own()
+            .map(|((_, frf), curve)| distance(curve.iter().copied(), frf))
+            .sum();
+        (distance > APART * lines as f64).then_some(Tried {
+            posture,
+            log: 0.0,
+            power: 0.0,
+            distance,
+        })
+    };
+    Ok(data
+        .measured_postures()
+        .into_iter()
+        .filter_map(of_posture)
+        .collect())
 }

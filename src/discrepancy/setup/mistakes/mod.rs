@@ -44,8 +44,6 @@ pub fn all(model: &StructureModel, data: &FrfData) -> Vec<Box<dyn Mistake>> {
     all.push(Box::new(sensor_mass::SensorMass));
     all.push(Box::new(late_channel::LateChannel));
     all.push(Box::new(coarse_lines::CoarseLines));
-    for power in [2, 1, 0] {
-        all.push(Box::new(frequency_axis::FrequencyAxis { power }));
-    }
+    all.push(Box::new(frequency_axis::FrequencyAxis));
     all
 }

@@ -1,6 +1,7 @@
 //! The same FRF measured twice, and not the same.
 
 use super::super::finding::SetupFinding;
+use super::names::{dofs, first_of};
 use crate::data::Point;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData, FrfDatum};
 
@@ -24,14 +25,7 @@ pub fn contradictions(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
             let Some(difference) = same.then(|| contradiction(a, b)).flatten() else {
                 continue;
             };
-            let letter = |axis: crate::data::Axis| axis.letter();
-            let name = format!(
-                "{}{}/{}{}",
-                points[a.response.point].node,
-                letter(a.response.axis),
-                points[a.reference.point].node,
-                letter(a.reference.axis)
-            );
+            let name = dofs(a, points);
             match findings.iter_mut().find(|f| f.0 == a.posture) {
                 Some(found) => {
                     found.1 = found.1.max(difference);
@@ -47,14 +41,9 @@ pub fn contradictions(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
         .into_iter()
         .map(|(posture, difference, names)| {
             let id = data.posture_ids.get(posture).map_or("?", |id| id);
-            let shown: Vec<&str> = names.iter().take(3).map(String::as_str).collect();
-            let more = match names.len() > 3 {
-                true => format!(" and {} more", names.len() - 3),
-                false => String::new(),
-            };
             SetupFinding {
                 kind: "duplicates",
-                place: format!("posture {id}: {}{more}", shown.join(", ")),
+                place: format!("posture {id}: {}", first_of(&names)),
                 value: Some(difference),
                 std_error: None,
                 unit: "1",

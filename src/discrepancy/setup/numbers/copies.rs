@@ -3,21 +3,10 @@
 use std::collections::HashMap;
 
 use super::super::finding::SetupFinding;
+use super::names::{dofs, first_of};
 use super::{LEAST_LINES, SURE};
 use crate::data::Point;
 use crate::identify::frfs::frf_data::{FrfData, FrfDatum};
-
-/// `1X/1Y`, response before reference.
-fn dofs(frf: &FrfDatum, points: &[Point]) -> String {
-    let [response, reference] = [&frf.response, &frf.reference].map(|dof| {
-        format!(
-            "{}{}",
-            points.get(dof.point).map_or(0, |p| p.node),
-            dof.axis.letter()
-        )
-    });
-    format!("{response}/{reference}")
-}
 
 /// Two FRFs that may hold the same numbers: measured twice under one name, or one taken for its reciprocal.
 fn may_be_alike(a: &FrfDatum, b: &FrfDatum) -> bool {
@@ -38,10 +27,8 @@ pub fn copies(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
     // Postures, and the names of what they share, in the order of the data.
     let mut shared: Vec<([usize; 2], Vec<String>)> = Vec::new();
     for (_, frf) in data.frfs().filter(|(_, f)| f.receptance.len() >= LEAST_LINES) {
-        let Some(known) = first.get(&bits(frf)) else {
-            first.insert(bits(frf), frf);
-            continue;
-        };
+        let known = *first.entry(bits(frf)).or_insert(frf);
+        // It may be this one itself.
         if may_be_alike(known, frf) {
             continue;
         }
@@ -64,15 +51,11 @@ pub fn copies(data: &FrfData, points: &[Point]) -> Vec<SetupFinding> {
         .into_iter()
         .map(|([a, b], names)| {
             let id = |p: usize| data.posture_ids.get(p).map_or("?", |id| id);
-            let more = match names.len() > 3 {
-                true => format!(" and {} more", names.len() - 3),
-                false => String::new(),
-            };
-            let names = names[..names.len().min(3)].join(", ");
+            let names = first_of(&names);
             let (place, which) = match a == b {
-                true => (format!("posture {}: {names}{more}", id(a)), "directions"),
+                true => (format!("posture {}: {names}", id(a)), "directions"),
                 false => (
-                    format!("postures {} and {}: {names}{more}", id(a), id(b)),
+                    format!("postures {} and {}: {names}", id(a), id(b)),
                     "postures",
                 ),
             };

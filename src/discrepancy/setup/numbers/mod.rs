@@ -2,6 +2,7 @@
 
 mod contradictions;
 mod copies;
+mod names;
 mod phase_missing;
 
 use super::finding::SetupFinding;

@@ -3,6 +3,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
+use super::joint_angles;
 use super::proposal::Proposed;
 use super::table::DistanceTable;
 use crate::Result;
@@ -49,7 +50,7 @@ impl FileReading for JointConvention {
             Convention::Zero(turn) => (
                 "encoder-offset",
                 "all postures".to_owned(),
-                Some(turn.to_degrees()),
+                Some(turn),
                 format!(
                     "Add {:+.0} deg to {angle}, or to the offset of that joint in the robot file.",
                     turn.to_degrees()
@@ -71,15 +72,7 @@ impl FileReading for JointConvention {
                 )
             }
         };
-        SetupFinding {
-            kind,
-            place: format!("joint {joint}, {what}"),
-            value,
-            std_error: None,
-            unit: if value.is_some() { "deg" } else { "" },
-            confidence: 0.0,
-            remedy,
-        }
+        joint_angles::finding(kind, format!("joint {joint}, {what}"), value, remedy)
     }
 }
 
@@ -99,10 +92,7 @@ pub fn proposed(
     data: &FrfData,
     theta: &[f64],
 ) -> Result<Vec<Proposed>> {
-    let given = data.kinematics_by_posture();
-    let angles_rad = |kinematics: &Kinematics| kinematics.joint_angles_rad(&model.robot.spec);
-    let with_angles: Vec<Option<(&Kinematics, Vec<f64>)>> =
-        given.iter().map(|k| k.map(|k| (k, angles_rad(k)))).collect();
+    let with_angles = joint_angles::given(model, data);
     let mut all = Vec::new();
     for joint in 1..=model.robot.joint_count() {
         let zeros = [FRAC_PI_2, -FRAC_PI_2, PI].map(Convention::Zero);

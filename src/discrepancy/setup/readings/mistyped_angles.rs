@@ -3,6 +3,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use super::super::finding::SetupFinding;
 use super::super::reading::FileReading;
 use super::super::scene::predict;
+use super::joint_angles;
 use super::proposal::Proposed;
 use super::table::DistanceTable;
 use crate::Result;
@@ -112,16 +113,8 @@ impl FileReading for MistypedAngles {
                 format!("Add {:+.0} to number {joint} of {line}.", turn.to_degrees()),
             ),
         };
-        let value = (kind == "encoder-offset").then_some(self.turn_rad.to_degrees());
-        SetupFinding {
-            kind,
-            place: format!("{joint}, posture {id}"),
-            value,
-            std_error: None,
-            unit: if value.is_some() { "deg" } else { "" },
-            confidence: 0.0,
-            remedy: what,
-        }
+        let turn_rad = (kind == "encoder-offset").then_some(self.turn_rad);
+        joint_angles::finding(kind, format!("{joint}, posture {id}"), turn_rad, what)
     }
 
     fn tried(&self) -> f64 {
@@ -140,11 +133,7 @@ pub fn proposed(
     if postures.len() < 2 {
         return Ok(Vec::new());
     }
-    let given = data.kinematics_by_posture();
-    let with_angles: Vec<Option<(&Kinematics, Vec<f64>)>> = given
-        .iter()
-        .map(|k| k.map(|k| (k, k.joint_angles_rad(&model.robot.spec))))
-        .collect();
+    let with_angles = joint_angles::given(model, data);
     let slips = Slip::all(model.robot.joint_count());
     let tried = slips.len() * postures.len();
     let mut all = Vec::new();

@@ -3,6 +3,7 @@
 mod axes;
 mod channel_sign;
 mod dead_channel;
+mod joint_angles;
 mod joint_convention;
 mod mistyped_angles;
 mod phase_conjugated;

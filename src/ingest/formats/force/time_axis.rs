@@ -52,6 +52,9 @@ pub(crate) fn fill(values: &mut Vec<f64>, gaps: &[Gap]) -> Vec<Range<usize>> {
     filled
 }
 
+/// The remedy of times that are wrong where the samples are right.
+const OR_A_RATE: &str = "where the samples are even and the times are not to be trusted: give rate_hz in a [[channel]] of campaign.toml";
+
 /// Sampling rate and start from the time column, checked against the rate of the header. The column is what was
 /// measured: a header describes the recording, an export may be decimated.
 pub(crate) fn time_axis(
@@ -76,8 +79,7 @@ pub(crate) fn time_axis(
                     grid: None,
                 })
             }
-            _ => Err(error.remedy("the time column must rise from row to row; where the samples are even and the times are not to be trusted: give rate_hz in a \
-                                          [[channel]] of campaign.toml")),
+            _ => Err(error.remedy(format!("the time column must rise from row to row; {OR_A_RATE}"))),
         };
     }
     if !runs.are_even(seconds) {
@@ -125,10 +127,9 @@ pub(crate) fn time_axis(
 pub(crate) fn refused(problem: &str, header: &Header) -> InputError {
     InputError::new(format!("the samples are not evenly spaced in time: {problem}"))
         .line(header.data_line)
-        .remedy(
-            "export the record again with even steps, or cut the row range out that has them; where the samples are even and the \
-             times are not to be trusted: give rate_hz in a [[channel]] of campaign.toml",
-        )
+        .remedy(format!(
+            "export the record again with even steps, or cut the row range out that has them; {OR_A_RATE}"
+        ))
 }
 
 /// Factor that puts right a time column whose unit is called wrongly ("ms" on values in seconds): what the header's rate

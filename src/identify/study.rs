@@ -537,7 +537,7 @@ pub struct Looked<D: Modelled> {
 }
 
 /// Times the lowest misfit from which on a candidate is out of the race: it is not followed to its end.
-const OUT_OF_RACE: f64 = 10.0;
+pub const OUT_OF_RACE: f64 = 10.0;
 
 /// Follows each to its end on the coarse view; those out of the race after the first steps, or not among so
 /// many of the first (`most`), stay where these ended. In the order given; `None` where the fit failed.

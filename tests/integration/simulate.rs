@@ -408,6 +408,28 @@ fn wrong_wishes_are_refused_plainly() {
     assert_eq!(run.status, Some(2), "{}", run.stderr);
 }
 
+/// A clamp that holds the tool changes everything, so that the screen sees other places first; of two faint resonators on one link, the
+/// second leaves next to nothing.
+#[test]
+fn the_data_draw_what_hides_behind_the_rest() {
+    let drawn = |kind: &str, seed: &str| {
+        let cell = Simulated::new(&["--unknown", kind, "--seed", seed]);
+        let found = document(&["localise", cell.path()]);
+        (found["places"][0].clone(), cell.truth()["parameters"].clone())
+    };
+    let (clamp, truth) = drawn("clamp-to-table", "800");
+    assert_eq!(clamp["place"], "tool-ground.x");
+    assert!(clamp["left"].as_f64().unwrap() < 1.1, "{clamp}");
+    let of_truth = clamp["parameters"]["stiffness_n_per_m"].as_f64().unwrap()
+        / truth["stiffness_n_per_m"].as_f64().unwrap();
+    assert!((of_truth - 1.0).abs() < 0.02, "{of_truth}");
+    let (pair, truth) = drawn("two-resonators", "804");
+    assert_eq!(pair["place"], "link-3.z");
+    assert!(!pair["second"].is_null(), "{pair}");
+    let of_truth = pair["parameters"]["mass_kg"].as_f64().unwrap() / truth["mass_kg"][0].as_f64().unwrap();
+    assert!((of_truth - 1.0).abs() < 0.05, "{of_truth}");
+}
+
 /// Physics outside the library, as faint as asked for, named in the truth and nowhere in the folder.
 #[test]
 fn a_departure_is_as_faint_as_asked_for() {

@@ -25,7 +25,7 @@ use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
 use crate::identify::frfs::structure_study::{led_astray, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Looked, Study, Tried, View, fit_from, held_out, look, race,
+    Effort, Extent, HeldOut, Looked, OUT_OF_RACE, Study, Tried, View, fit_from, held_out, look, race,
 };
 use crate::identify::{StructureModel, StructureStudy};
 use screen::{CurvePoint, Screened};
@@ -244,38 +244,22 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     }
     // A support that gives way leads the model far away, and what is linear there says least of it.
     let is_far = !starts.elsewhere.is_empty();
-    let supports = screened.iter().enumerate().filter(|(i, _)| {
-        let is_known = chosen.iter().any(|(known, _)| known == i);
-        is_far && ties[*i] == *i && !is_known
-    });
-    let supports: Vec<(usize, Sought)> = supports
-        .filter_map(|(i, support)| {
-            let forms = vec![support_form(support.spot)?];
-            let sought = Sought::new(support, starts.clone());
-            Some((i, Sought { forms, ..sought }))
+    let supports: Vec<(usize, Sought)> = unseen_supports(&screened, &ties, &chosen)
+        .filter(|_| is_far)
+        .map(|(i, form)| {
+            let sought = Sought::new(&screened[i], starts.clone());
+            let forms = vec![form];
+            (i, Sought { forms, ..sought })
         })
         .collect();
     chosen.extend(supports);
-    let looked: Vec<(usize, Looked<Structure>)> = chosen
-        .par_iter()
-        .flat_map_iter(|(place, sought)| {
-            let forms = sought.look(study, model);
-            forms.into_iter().map(|form| (*place, form))
-        })
-        .collect();
     let base_count = model.parameters.len();
     let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
     let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
-    let (own, looked): (Vec<usize>, Vec<Looked<Structure>>) = looked.into_iter().unzip();
     let mut by_place: BTreeMap<usize, Vec<Tried<Structure>>> = BTreeMap::new();
-    for (place, tried) in own.into_iter().zip(race(study, looked, FOLLOWED)) {
-        let Some(tried) = tried else { continue };
-        let renamed = along_its_axis(study, model, &tried);
-        let (place, tried) = renamed
-            .and_then(|(spot, renamed)| Some((place_of(spot)?, renamed)))
-            .unwrap_or((place, tried));
+    for (place, tried) in try_all(study, model, &chosen, place_of) {
         by_place.entry(place).or_default().push(tried);
     }
     let mut fitted: Vec<(usize, Vec<Tried<Structure>>)> = by_place
@@ -299,16 +283,25 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .first()
         .map_or(f64::INFINITY, |(_, forms)| forms[0].fit.cost);
     let is_enough = 2.0 * least <= SECOND_FROM * values;
+    // Of a place that leaves next to nothing, what is found second is faint: sought at the best alone, and not after a large first one.
+    let sought_at = match (is_enough, is_far) {
+        (false, _) => SECOND[0],
+        (true, false) => 1,
+        (true, true) => 0,
+    };
     let second: Vec<Option<Second>> = fitted
         .par_iter()
-        .enumerate()
-        .map(|(rank, (i, forms))| {
-            if rank >= SECOND[0] || is_enough {
-                return None;
-            }
+        .take(sought_at)
+        .map(|(i, forms)| {
             let spot = screened[*i].spot;
-            let second = second_form(study, (model, &thinned), forms, spot, &starts.elsewhere)?;
-            better(second.tried(), &forms[0]).is_lt().then_some(second)
+            let other = second_form(study, (model, &thinned), forms, spot, &starts.elsewhere);
+            let same = two_resonators(study, (model, &thinned), &forms[0], spot);
+            let same = same.map(|tried| Second::Instead(spot, tried));
+            let best = other
+                .into_iter()
+                .chain(same)
+                .min_by(|a, b| better(a.tried(), b.tried()))?;
+            better(best.tried(), &forms[0]).is_lt().then_some(best)
         })
         .collect();
     let mut fitted: Vec<Fitted> = fitted
@@ -418,6 +411,44 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     Ok(found)
 }
 
+/// Each form of each place followed as far as it promises, with its place: that of the axis it mostly follows.
+fn try_all(
+    study: &StructureStudy,
+    model: &StructureModel,
+    chosen: &[(usize, Sought)],
+    place_of: impl Fn(Spot) -> Option<usize>,
+) -> Vec<(usize, Tried<Structure>)> {
+    let look_at = |leading: bool, at: &(dyn Fn(usize) -> bool + Sync)| {
+        let there = chosen.par_iter().filter(|(place, _)| at(*place));
+        let each = there.flat_map_iter(|(place, sought)| {
+            let forms = sought.look(study, model, &sought.part(leading));
+            forms.into_iter().map(|form| (*place, form))
+        });
+        each.collect::<Vec<(usize, Looked<Structure>)>>()
+    };
+    let mut looked = look_at(true, &|_| true);
+    let cost = |(_, looked): &(usize, Looked<Structure>)| looked.fits[0].cost;
+    let lowest = looked.iter().map(cost).fold(f64::INFINITY, f64::min);
+    let in_race: Vec<usize> = looked
+        .iter()
+        .filter(|form| cost(form) <= OUT_OF_RACE * lowest)
+        .map(|(place, _)| *place)
+        .collect();
+    looked.extend(look_at(false, &|place| in_race.contains(&place)));
+    let (own, looked): (Vec<usize>, Vec<Looked<Structure>>) = looked.into_iter().unzip();
+    let followed = own.into_iter().zip(race(study, looked, FOLLOWED));
+    let each = followed.filter_map(|(place, tried)| {
+        let tried = tried?;
+        let renamed = along_its_axis(study, model, &tried);
+        Some(
+            renamed
+                .and_then(|(spot, renamed)| Some((place_of(spot)?, renamed)))
+                .unwrap_or((place, tried)),
+        )
+    });
+    each.collect()
+}
+
 /// Every one of `spots` without a law, at a point of the model (solver's scale).
 fn screen_at(model: &StructureModel, theta: &[f64], data: &FrfData, spots: &[Spot]) -> Result<Vec<Screened>> {
     let responses = SpotResponses::new(model, theta, data, spots)?;
@@ -484,11 +515,31 @@ fn place(
     }
 }
 
-/// What is tried wherever a support may give way: along the axis of a bearing, or alike both ways across it. `None` for what turns with
-/// a joint, and where one way across is the other's.
+/// The supports that are not among the chosen places, by their number, with what is tried at them.
+fn unseen_supports<'a>(
+    screened: &'a [Screened],
+    ties: &'a [usize],
+    chosen: &'a [(usize, Sought)],
+) -> impl Iterator<Item = (usize, DrawnForm)> + 'a {
+    screened.iter().enumerate().filter_map(move |(i, support)| {
+        let form = support_form(support.spot)?;
+        let is_known = |own: usize| chosen.iter().any(|(known, _)| *known == own);
+        // What leans does so from any axis of its place: from the one that promises most.
+        let leans = form == DrawnForm::ObliqueSpringDamper;
+        let shares = |(other, s): (usize, &Screened)| {
+            (other < i || is_known(other)) && s.spot.shares_place_with(support.spot)
+        };
+        let is_sought = is_known(i) || (leans && screened.iter().enumerate().any(shares));
+        (ties[i] == i && !is_sought).then_some((i, form))
+    })
+}
+
+/// What is tried wherever a support may give way, along the axis of a bearing or alike both ways across it, or one be there that the
+/// model does not have. `None` for what turns with a joint, and where one way across is the other's.
 fn support_form(spot: Spot) -> Option<DrawnForm> {
     match spot {
         Spot::Base(2) | Spot::Bearing(_, 2) => Some(DrawnForm::Spring),
+        Spot::ToolGround(_) | Spot::LinkGround(..) => Some(DrawnForm::ObliqueSpringDamper),
         _ => spot.alike().map(|_| DrawnForm::IsotropicSpring),
     }
 }
@@ -511,8 +562,35 @@ impl<'a> Sought<'a> {
         }
     }
 
-    /// The first steps of the fit of each form, started from the drawn curve.
-    fn look(&self, study: &StructureStudy, model: &StructureModel) -> Vec<Looked<Structure>> {
+    /// The `leading` forms, which have others as their special cases or stand alone, or the others: these are not needed at a place where
+    /// the leading ones leave far too much.
+    fn part(&self, leading: bool) -> Vec<DrawnForm> {
+        let leads = |form: &DrawnForm| {
+            matches!(
+                form,
+                DrawnForm::SpringDamper
+                    | DrawnForm::Resonator
+                    | DrawnForm::Maxwell
+                    | DrawnForm::ObliqueSpringDamper
+                    | DrawnForm::RotorOnSpring
+                    | DrawnForm::FloorMode
+                    | DrawnForm::IsotropicSpringDamper
+            )
+        };
+        let all_lead = !self.forms.iter().any(leads);
+        let forms = self.forms.iter().copied();
+        forms
+            .filter(|form| (all_lead || leads(form)) == leading)
+            .collect()
+    }
+
+    /// The first steps of the fit of each of `forms`, started from the drawn curve.
+    fn look(
+        &self,
+        study: &StructureStudy,
+        model: &StructureModel,
+        forms: &[DrawnForm],
+    ) -> Vec<Looked<Structure>> {
         let (from, screened) = (&self.starts, self.screened);
         let bounds = model.bounds();
         let moved: Vec<f64> = from
@@ -528,7 +606,7 @@ impl<'a> Sought<'a> {
             true => Effort::Direct,
             false => Effort::StagedAtAGlance,
         };
-        self.forms
+        forms
             .par_iter()
             .filter_map(|&form| {
                 let instance = drawn::instance(screened.spot, form);
@@ -697,7 +775,7 @@ fn second_form(
     let looked = promising.iter().take(SECOND[1]).flat_map(|second| {
         let mut sought = Sought::new(second, starts.clone());
         sought.forms.retain(|form| !form.is_isotropic());
-        let forms = sought.look(study, model);
+        let forms = sought.look(study, model, &sought.forms);
         forms.into_iter().map(|form| (second.spot, form))
     });
     let (spots, looked): (Vec<Spot>, Vec<Looked<Structure>>) = looked.unzip();
@@ -720,6 +798,40 @@ fn second_form(
         Some(alone) => Second::Instead(pair.second, alone),
         None => Second::Beside(pair),
     })
+}
+
+/// A second resonator at the displacement where `first` is one, started from what is left with that.
+fn two_resonators(
+    study: &StructureStudy,
+    (bare, thinned): (&StructureModel, &FrfData),
+    first: &Tried<Structure>,
+    spot: Spot,
+) -> Option<Tried<Structure>> {
+    if drawn::form_of(first.instance.variant) != DrawnForm::Resonator {
+        return None;
+    }
+    let left = screen_at(&first.model, &first.fit.theta, thinned, &[spot])
+        .ok()?
+        .pop()?;
+    let (base, own) = first.fit.theta.split_at(bare.parameters.len());
+    let instance = drawn::instance(spot, DrawnForm::TwoResonators);
+    let extended = study.extend(bare, &instance);
+    let of_second = &extended.parameters[base.len() + own.len()..];
+    let starts: Vec<Vec<f64>> = screen::resonators(&left.curve, 3)
+        .into_iter()
+        .map(|second| {
+            let second = of_second.iter().zip(second);
+            let second = second.map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
+            own.iter().copied().chain(second).collect()
+        })
+        .collect();
+    let fits = look(study, &extended, &[base.to_vec()], &starts, Effort::Direct).ok()?;
+    let looked = Looked {
+        instance,
+        model: extended,
+        fits,
+    };
+    race(study, vec![looked], 1).pop()?
 }
 
 /// The second form of a pair alone, from where it stands beside the first.

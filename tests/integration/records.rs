@@ -291,6 +291,18 @@ fn a_wrong_speed_and_wrong_teeth_are_told_with_the_right_ones() {
             "the tool has 6 teeth and not 4",
         ],
     );
+    // Fewer than listed: all that comes back in a turn does so six times, and nothing seven times.
+    for (listed, ratio) in [("7", "0.857"), ("12", "0.500")] {
+        let written = format!("teeth = {listed}");
+        let (_, warnings, _) = with_toml(&[], |_| (), |t| t.replace("teeth = 6", &written));
+        told(
+            &warnings,
+            &[
+                &format!("all cuts: the tooth-passing line stands at {ratio} times"),
+                &format!("the tool has 6 teeth and not {listed}"),
+            ],
+        );
+    }
 }
 
 #[test]

@@ -16,8 +16,8 @@ use crate::cutting::measured::cut_analysis::{
 };
 use crate::cutting::measured::leak::high_pass;
 use crate::cutting::measured::teeth::{
-    CERTAIN, TwiceOverOnce, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn, tooth_back_mm,
-    tooth_passing_too_weak, uneven_chip_mm,
+    CERTAIN, TwiceOverOnce, fewer_teeth, idle_tooth, one_tooth_alone, other_than_listed, parts_of_turn,
+    tooth_back_mm, tooth_passing_too_weak, uneven_chip_mm,
 };
 use crate::cutting::measured::uneven_teeth::UnevenTeeth;
 use crate::cutting::measured::whole_record::WholeRecord;
@@ -49,7 +49,7 @@ const IDLE_TOOTH: &str = "the teeth cut very unevenly, once per turn instead of 
      is as large as the feed per tooth, or [tool] teeth or spindle_rpm is wrong; a tooth that does not cut leaves its edge force out, so that the edge \
      coefficients come out low by its share";
 const FEWER_PARTS: &str = "the forces come back several times per turn, but less often than the stated teeth pass, as a tool with fewer \
-     teeth makes them, or the stated teeth at a multiple of the stated speed: check [tool] teeth and spindle_rpm (and the feed per tooth \
+     teeth makes them, or the stated teeth at another speed: check [tool] teeth and spindle_rpm (and the feed per tooth \
      that goes with them); averages cannot tell that, and coefficients are wrong by the same factor. Where both are right, the teeth \
      alternate (tooth_radius_offset_mm or pitch_deg in [tool] take it into account)";
 /// Unevenness over that of one tooth cutting alone that no error of the directions explains (power).
@@ -307,8 +307,11 @@ pub fn analyse_cut<S: Sample>(
         // At a wrong speed the orders are no orders of the turn, and say nothing of the teeth.
         of_turn = turn_orders(trials, cut, &channels, &usable, &phases, record);
         if let Some(of_turn) = &of_turn {
-            teeth_notice(of_turn, cut, &mut notices);
-            passes_times = of_turn.twice_as_often().map(|_| 2.0);
+            let twice = of_turn.twice_as_often();
+            let fewer = of_turn.fewer_teeth();
+            teeth_notice(of_turn, twice.as_ref(), fewer, cut, &mut notices);
+            let fewer = fewer.map(|teeth| teeth as f64 / of_turn.milling.teeth as f64);
+            passes_times = twice.map(|_| 2.0).or(fewer);
         }
     }
     Ok(CutAnalysis {
@@ -332,7 +335,9 @@ pub fn analyse_cut<S: Sample>(
         channels,
         tooth_line,
         passes_times,
-        uneven_teeth: of_turn.as_ref().and_then(TurnOrders::uneven_teeth),
+        uneven_teeth: of_turn
+            .filter(|_| passes_times.is_none())
+            .and_then(|of_turn| of_turn.uneven_teeth()),
         spindle: None,
         notices,
     })
@@ -620,9 +625,7 @@ impl TurnOrders {
 
     /// The line at twice the stated tooth passing is stronger than any cut of the stated teeth makes it.
     fn twice_as_often(&self) -> Option<TwiceOverOnce> {
-        let is_judged =
-            self.milling.places.is_empty() && !is_noise(&self.over_noise) && !self.turns_with_the_tool();
-        if !is_judged {
+        if !self.shows_teeth() {
             return None;
         }
         let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
@@ -633,6 +636,19 @@ impl TurnOrders {
             std,
             self.zero_is_known.then_some(self.mean),
         )
+    }
+
+    /// Whether their values say anything of teeth that are taken for alike.
+    fn shows_teeth(&self) -> bool {
+        self.milling.places.is_empty() && !is_noise(&self.over_noise) && !self.turns_with_the_tool()
+    }
+
+    /// The forces come back as often per turn as a tool with fewer teeth makes them.
+    fn fewer_teeth(&self) -> Option<usize> {
+        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
+        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        let found = || fewer_teeth(&self.milling, orders, std, self.mean, self.zero_is_known);
+        self.shows_teeth().then(found).flatten()
     }
 
     /// Where the teeth are not listed one by one.
@@ -723,7 +739,13 @@ fn turn_orders<S: Sample>(
     })
 }
 
-fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
+fn teeth_notice(
+    of_turn: &TurnOrders,
+    twice: Option<&TwiceOverOnce>,
+    fewer: Option<usize>,
+    cut: &Cut,
+    notices: &mut Vec<Notice>,
+) {
     if is_noise(&of_turn.over_noise) {
         notices.push(Notice {
             kind: NOTHING_REPEATS,
@@ -760,7 +782,7 @@ fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
         }
         return;
     }
-    if let Some(slow) = of_turn.twice_as_often() {
+    if let Some(slow) = twice {
         notices.push(Notice {
             kind: OTHER_MULTIPLE,
             detail: format!(
@@ -775,6 +797,20 @@ fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
                 2 * milling.teeth
             ),
         });
+        return;
+    }
+    // So many parts of a turn are the teeth, or the turns.
+    let fewer_parts = |parts: usize, turns: f64| Notice {
+        kind: FEWER_PARTS,
+        detail: format!(
+            "{parts} times per turn of {} rpm: as {parts} teeth, or {} at {} rpm",
+            cut.spindle_rpm,
+            milling.teeth,
+            figures(cut.spindle_rpm * turns, 4)
+        ),
+    };
+    if let Some(teeth) = fewer {
+        notices.push(fewer_parts(teeth, teeth as f64 / milling.teeth as f64));
         return;
     }
     if let Some(part) = idle_tooth(milling, orders, mean, zero_is_known) {
@@ -810,15 +846,7 @@ fn teeth_notice(of_turn: &TurnOrders, cut: &Cut, notices: &mut Vec<Notice>) {
         return;
     }
     if let Some(parts) = parts_of_turn(milling.teeth, orders, std, zero_is_known) {
-        notices.push(Notice {
-            kind: FEWER_PARTS,
-            detail: format!(
-                "{parts} times per turn of {} rpm: as {parts} teeth, or {} at {} rpm",
-                cut.spindle_rpm,
-                milling.teeth,
-                figures(cut.spindle_rpm * parts as f64, 4)
-            ),
-        });
+        notices.push(fewer_parts(parts, parts as f64));
         return;
     }
     let back = tooth_back_mm(milling, orders, std, mean, zero_is_known);

@@ -176,6 +176,40 @@ pub(crate) fn parts_of_turn(
     })
 }
 
+/// Share of the chips of the teeth that are too many which the others take over, as a power, at least: of teeth that merely alternate
+/// each cuts, and the line of every so many of them is weaker.
+const TAKEN_OVER: f64 = 0.5;
+
+/// How many teeth the tool has in truth, where those are fewer than listed (two at least): all that comes back in a turn comes back
+/// that many times. Where the listed ones are a multiple of it, every so many of them might cut little; they are too many only where
+/// they cut next to nothing. What is asked for is as for [`idle_tooth`] and [`parts_of_turn`].
+pub(crate) fn fewer_teeth(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    std: [&[f64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<usize> {
+    let listed = cut.teeth;
+    let power = |k: usize| power_of(orders, k);
+    let count = orders.iter().map(|o| o.len()).min()?;
+    (2..listed).rev().find(|teeth| {
+        let in_step = |k: &usize| k.is_multiple_of(*teeth);
+        let inside: f64 = (1..=count).filter(in_step).map(power).sum();
+        let outside: f64 = (1..=count).filter(|k| !in_step(k)).map(power).sum();
+        let is_certain = power(*teeth) > CERTAIN * CERTAIN * noise_of(std, *teeth);
+        let others_idle = || {
+            let unit = single_tooth(cut).closed_form(listed);
+            let n = listed as f64;
+            direction(&unit, n, orders, mean, zero_is_known).is_some_and(|direction| {
+                power(*teeth) > TAKEN_OVER * n * n * power_of_chip(&unit, *teeth, direction)
+            })
+        };
+        let is_clear = is_certain && outside < OUT_OF_STEP * inside;
+        is_clear && (!listed.is_multiple_of(*teeth) || others_idle())
+    })
+}
+
 /// A tooth that stands back by this part of the feed per tooth is worth a notice: from four teeth on, where an offset of the
 /// tool's axis is told apart from it, and below, where both look the same.
 const STANDS_BACK: f64 = 0.15;
@@ -470,6 +504,47 @@ mod tests {
             max_relative = 0.02
         );
         assert_eq!(found(1e3, &[]), None);
+    }
+
+    /// A tool of six teeth, or of two, is known whatever the list says, as long as it says more; teeth that alternate, are missing or stand
+    /// unevenly are not too many.
+    #[test]
+    fn a_tool_with_fewer_teeth_than_listed_is_known() {
+        let found = |teeth: usize, radii: &[f64], listed: usize| {
+            let mut own = cut(teeth, 20.0, 130.0);
+            own.places = own.places_or_even();
+            own.places
+                .iter_mut()
+                .zip(radii.iter().cycle())
+                .for_each(|(place, radius)| place.radius_mm = *radius);
+            let highest = 2 * listed;
+            let unit = own.linear(highest);
+            let force = |axis: usize, k: usize| {
+                (unit[0][axis][k] + unit[1][axis][k] * 0.3) * 1500.0
+                    + (unit[3][axis][k] + unit[4][axis][k]) * 20.0
+            };
+            let orders = [0, 1].map(|axis| (1..=highest).map(|k| force(axis, k)).collect::<Vec<_>>());
+            let mean = [force(0, 0).re, force(1, 0).re];
+            let std = vec![0.5; highest];
+            let orders = [orders[0].as_slice(), orders[1].as_slice()];
+            fewer_teeth(&cut(listed, 20.0, 130.0), orders, [&std, &std], mean, true)
+        };
+        for listed in [7, 8, 9, 10, 12, 18] {
+            assert_eq!(found(6, &[0.0], listed), Some(6), "{listed}");
+        }
+        assert_eq!(found(6, &[0.0, 0.002, -0.002], 7), Some(6));
+        assert_eq!(found(2, &[0.0], 3), Some(2));
+        assert_eq!(found(2, &[0.0], 4), Some(2));
+        assert_eq!(found(6, &[0.0], 6), None);
+        // Every second tooth is set back, by two thirds of the feed per tooth at most.
+        for back_mm in [0.01, 0.03, 0.06] {
+            assert_eq!(found(12, &[0.0, -back_mm], 12), None, "{back_mm}");
+        }
+        // One of three, and two of four beside each other, do not cut.
+        assert_eq!(found(3, &[0.0, 0.0, -2.0], 3), None);
+        assert_eq!(found(4, &[0.0, 0.0, -2.0, -2.0], 4), None);
+        // Of one alone nothing is said: it may be the last of a tool that lost the others.
+        assert_eq!(found(1, &[0.0], 2), None);
     }
 
     /// One tooth of four missing: told by the right list, by one with its neighbour missing as well, and where none is missing.

@@ -178,7 +178,9 @@ pub(crate) fn parts_of_turn(
 
 /// Share of the chips of the teeth that are too many which the others take over, as a power, at least: of teeth that merely alternate
 /// each cuts, and the line of every so many of them is weaker.
-const TAKEN_OVER: f64 = 0.5;
+const TAKEN_OVER: f64 = 0.75;
+/// Below this part of a tooth's strongest order its line at the tooth passing says nothing of that (a slot has none on even orders).
+const HAS_A_LINE: f64 = 1e-3;
 
 /// How many teeth the tool has in truth, where those are fewer than listed (two at least): all that comes back in a turn comes back
 /// that many times. Where the listed ones are a multiple of it, every so many of them might cut little; they are too many only where
@@ -202,7 +204,10 @@ pub(crate) fn fewer_teeth(
             let unit = single_tooth(cut).closed_form(listed);
             let n = listed as f64;
             direction(&unit, n, orders, mean, zero_is_known).is_some_and(|direction| {
-                power(*teeth) > TAKEN_OVER * n * n * power_of_chip(&unit, *teeth, direction)
+                let of_tooth = |k: usize| power_of_chip(&unit, k, direction);
+                let strongest = (1..=listed).map(of_tooth).fold(0.0, f64::max);
+                of_tooth(*teeth) > HAS_A_LINE * strongest
+                    && power(*teeth) > TAKEN_OVER * n * n * of_tooth(*teeth)
             })
         };
         let is_clear = is_certain && outside < OUT_OF_STEP * inside;
@@ -510,8 +515,8 @@ mod tests {
     /// unevenly are not too many.
     #[test]
     fn a_tool_with_fewer_teeth_than_listed_is_known() {
-        let found = |teeth: usize, radii: &[f64], listed: usize| {
-            let mut own = cut(teeth, 20.0, 130.0);
+        let found_in = |[start_deg, exit_deg]: [f64; 2], teeth: usize, radii: &[f64], listed: usize| {
+            let mut own = cut(teeth, start_deg, exit_deg);
             own.places = own.places_or_even();
             own.places
                 .iter_mut()
@@ -527,8 +532,15 @@ mod tests {
             let mean = [force(0, 0).re, force(1, 0).re];
             let std = vec![0.5; highest];
             let orders = [orders[0].as_slice(), orders[1].as_slice()];
-            fewer_teeth(&cut(listed, 20.0, 130.0), orders, [&std, &std], mean, true)
+            fewer_teeth(
+                &cut(listed, start_deg, exit_deg),
+                orders,
+                [&std, &std],
+                mean,
+                true,
+            )
         };
+        let found = |teeth, radii: &[f64], listed| found_in([20.0, 130.0], teeth, radii, listed);
         for listed in [7, 8, 9, 10, 12, 18] {
             assert_eq!(found(6, &[0.0], listed), Some(6), "{listed}");
         }
@@ -536,10 +548,13 @@ mod tests {
         assert_eq!(found(2, &[0.0], 3), Some(2));
         assert_eq!(found(2, &[0.0], 4), Some(2));
         assert_eq!(found(6, &[0.0], 6), None);
-        // Every second tooth is set back, by two thirds of the feed per tooth at most.
-        for back_mm in [0.01, 0.03, 0.06] {
+        // Every second tooth is set back, by less than half of the feed per tooth.
+        for back_mm in [0.01, 0.03, 0.045] {
             assert_eq!(found(12, &[0.0, -back_mm], 12), None, "{back_mm}");
         }
+        // In a slot no line of six teeth tells what every second of twelve does; seven are too many all the same.
+        assert_eq!(found_in([0.0, 180.0], 12, &[0.0, -0.03], 12), None);
+        assert_eq!(found_in([0.0, 180.0], 5, &[0.0], 7), Some(5));
         // One of three, and two of four beside each other, do not cut.
         assert_eq!(found(3, &[0.0, 0.0, -2.0], 3), None);
         assert_eq!(found(4, &[0.0, 0.0, -2.0, -2.0], 4), None);

@@ -50,7 +50,7 @@ pub struct LocalisedPlace {
     pub left: f64,
     /// Scatter of the drawn dynamic stiffness over postures, in units of its noise variance: 1 if it is the same everywhere.
     pub consistency: f64,
-    /// Dynamic stiffness that the data ask for there, line by line.
+    /// Dynamic stiffness that the data ask for there, line by line; with the best form's law as its beginning where there is one.
     pub curve: Vec<CurvePoint>,
     /// Empty where the place was screened only.
     pub forms: Vec<FormFit>,
@@ -346,8 +346,11 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .map(|fitted| {
             let best = settled_form(study, screened[fitted.place].spot, fitted, &without)?;
             let count = study.data.value_count() as f64;
+            let (curve, consistency) = drawn_with(&best, &thinned)?;
             Ok(LocalisedPlace {
                 left: best.cost / (count - 0.5 * best.theta.len() as f64).max(1.0),
+                curve,
+                consistency,
                 ..place(&screened[fitted.place], &fitted.forms, &bic, Some(best))
             })
         })
@@ -453,6 +456,16 @@ fn try_all(
 fn screen_at(model: &StructureModel, theta: &[f64], data: &FrfData, spots: &[Spot]) -> Result<Vec<Screened>> {
     let responses = SpotResponses::new(model, theta, data, spots)?;
     Ok(screen::screen(&responses, &model.parameters, theta))
+}
+
+/// The dynamic stiffness that the data ask for where `best` is, and its scatter over postures: its law and what they want beyond it.
+/// Without it the model's parameters stand for a part of what is missing, and where much is, what is drawn from there is not the law.
+fn drawn_with(best: &BestForm, data: &FrfData) -> Result<(Vec<CurvePoint>, f64)> {
+    let DrawnPart { spot, parameters, .. } = &best.first;
+    let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
+    let responses = SpotResponses::new(&best.model, &best.theta, data, &[*spot])?;
+    let law = |frequency_hz| drawn::dynamic_stiffness(*spot, best.first.form(), &values, frequency_hz);
+    Ok(screen::draw_beyond(&responses, law))
 }
 
 /// Order of the settled places, those whose form ran to the end of its range last: BIC on all data.

@@ -45,6 +45,65 @@ pub fn screen(responses: &SpotResponses, parameters: &[Parameter], theta: &[f64]
         .collect()
 }
 
+/// What a law at the one spot of `responses` should be, line by line, where the model has one there already: that, with what the data ask
+/// for beyond it while the model's parameters stay, and its scatter over postures. `law`: dynamic stiffness at a frequency (Hz), of which
+/// a series spot adds the compliances. Postures are averaged in what is added, where noise does not bend the values.
+pub fn draw_beyond(responses: &SpotResponses, law: impl Fn(f64) -> Complex64) -> (Vec<CurvePoint>, f64) {
+    let is_series = responses.spots[0].is_series();
+    let (mut scatter, mut freedom) = (0.0, 0usize);
+    let points = common_lines(responses)
+        .into_iter()
+        .map(|(frequency_hz, lines)| {
+            let each = lines.iter().filter_map(|&l| {
+                let at = responses.line(l, 0).0;
+                beyond(at, at.on_residual / at.strength, is_series)
+            });
+            let own: Vec<(Complex64, f64)> = each.collect();
+            let mean = Mean::of(&own);
+            scatter += mean.scatter;
+            freedom += own.len().saturating_sub(1);
+            let law = law(frequency_hz);
+            let (stiffness, slope) = if is_series {
+                let all = (law.inv() + mean.value).inv();
+                (all, all.norm_sqr().max(law.norm_sqr()))
+            } else {
+                (law + mean.value, 1.0)
+            };
+            CurvePoint {
+                frequency_hz,
+                stiffness,
+                std: slope * mean.std(),
+            }
+        })
+        .collect();
+    (points, scatter / freedom.max(1) as f64)
+}
+
+/// Of values and their weights (1/variance).
+struct Mean {
+    value: Complex64,
+    weight: f64,
+    /// Σ of the weighted squares about it.
+    scatter: f64,
+}
+
+impl Mean {
+    fn of(own: &[(Complex64, f64)]) -> Self {
+        let weight: f64 = own.iter().map(|(_, w)| w).sum();
+        let value = own.iter().map(|(z, w)| z * *w).sum::<Complex64>() / weight.max(f64::MIN_POSITIVE);
+        Mean {
+            value,
+            weight,
+            scatter: own.iter().map(|(z, w)| w * (z - value).norm_sqr()).sum(),
+        }
+    }
+
+    /// Infinite without a value.
+    fn std(&self) -> f64 {
+        1.0 / self.weight.sqrt()
+    }
+}
+
 /// Lines of equal frequency, ascending.
 fn common_lines(responses: &SpotResponses) -> Vec<(f64, Vec<usize>)> {
     let mut order: Vec<usize> = (0..responses.lines.len()).collect();
@@ -179,18 +238,13 @@ fn curve(
                     stiffness(at, (at.on_residual - absorbed) / at.strength, series)
                 })
                 .collect();
-            let weight: f64 = own.iter().map(|(_, w)| w).sum();
-            let mean = own.iter().map(|(z, w)| z * *w).sum::<Complex64>() / weight.max(f64::MIN_POSITIVE);
-            scatter += own.iter().map(|(z, w)| w * (z - mean).norm_sqr()).sum::<f64>();
+            let mean = Mean::of(&own);
+            scatter += mean.scatter;
             freedom += own.len().saturating_sub(1);
             CurvePoint {
                 frequency_hz: *frequency_hz,
-                stiffness: mean,
-                std: if weight > 0.0 {
-                    1.0 / weight.sqrt()
-                } else {
-                    f64::INFINITY
-                },
+                stiffness: mean.value,
+                std: mean.std(),
             }
         })
         .collect();
@@ -199,16 +253,24 @@ fn curve(
 
 /// Dynamic stiffness and its weight (1/variance) from the strength g of the pattern.
 fn stiffness(at: &SpotLine, g: Complex64, series: bool) -> Option<(Complex64, f64)> {
-    let (z, slope) = if series {
-        // κ = 1/g − Z, dκ/dg = −1/g²
-        (g.inv() - at.own, 1.0 / g.norm_sqr())
-    } else {
-        // z = −g/(1 + g Y), dz/dg = −1/(1 + g Y)²
-        let factor = 1.0 + g * at.own;
-        (-g / factor, 1.0 / factor.norm_sqr())
-    };
-    let weight = at.strength / (slope * slope);
+    let (added, weight) = beyond(at, g, series)?;
+    if !series {
+        return Some((added, weight));
+    }
+    // κ = 1/g − Z, the inverse of the compliance
+    let z = added.inv();
+    let weight = weight / z.norm_sqr().powi(2);
     (z.is_finite() && weight.is_finite() && weight > 0.0).then_some((z, weight))
+}
+
+/// What stands beside all that the model has there, and its weight: a dynamic stiffness, at a series spot a compliance.
+fn beyond(at: &SpotLine, g: Complex64, series: bool) -> Option<(Complex64, f64)> {
+    // z = −g/(1 + g Y), dz/dg = −1/(1 + g Y)²; 1/κ = g/(1 − g Z), d(1/κ)/dg = 1/(1 − g Z)²
+    let sign = if series { -1.0 } else { 1.0 };
+    let factor = 1.0 + sign * g * at.own;
+    let added = -sign * g / factor;
+    let weight = at.strength * factor.norm_sqr().powi(2);
+    (added.is_finite() && weight.is_finite() && weight > 0.0).then_some((added, weight))
 }
 
 /// Starting values of a mass on a spring from a drawn curve, best first: (mass kg, frequency Hz, damping ratio).

@@ -420,6 +420,8 @@ fn the_data_draw_what_hides_behind_the_rest() {
     let (clamp, truth) = drawn("clamp-to-table", "800");
     assert_eq!(clamp["place"], "tool-ground.x");
     assert!(clamp["left"].as_f64().unwrap() < 1.1, "{clamp}");
+    // One law at all postures, seen from where it puts the robot.
+    assert!(clamp["consistency"].as_f64().unwrap() < 1.3, "{clamp}");
     let of_truth = clamp["parameters"]["stiffness_n_per_m"].as_f64().unwrap()
         / truth["stiffness_n_per_m"].as_f64().unwrap();
     assert!((of_truth - 1.0).abs() < 0.02, "{of_truth}");

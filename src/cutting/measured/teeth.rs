@@ -178,7 +178,7 @@ pub(crate) fn parts_of_turn(
 
 /// Share of the chips of the teeth that are too many which the others take over, as a power, at least: of teeth that merely alternate
 /// each cuts, and the line of every so many of them is weaker.
-const TAKEN_OVER: f64 = 0.75;
+const TAKEN_OVER: f64 = 0.5;
 /// Below this part of a tooth's strongest order its line at the tooth passing says nothing of that (a slot has none on even orders).
 const HAS_A_LINE: f64 = 1e-3;
 
@@ -548,8 +548,8 @@ mod tests {
         assert_eq!(found(2, &[0.0], 3), Some(2));
         assert_eq!(found(2, &[0.0], 4), Some(2));
         assert_eq!(found(6, &[0.0], 6), None);
-        // Every second tooth is set back, by less than half of the feed per tooth.
-        for back_mm in [0.01, 0.03, 0.045] {
+        // Every second tooth is set back, by less than a third of the feed per tooth.
+        for back_mm in [0.01, 0.02, 0.03] {
             assert_eq!(found(12, &[0.0, -back_mm], 12), None, "{back_mm}");
         }
         // In a slot no line of six teeth tells what every second of twelve does; seven are too many all the same.

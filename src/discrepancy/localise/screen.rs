@@ -46,33 +46,28 @@ pub fn screen(responses: &SpotResponses, parameters: &[Parameter], theta: &[f64]
 }
 
 /// What a law at the one spot of `responses` should be, line by line, where the model has one there already: that, with what the data ask
-/// for beyond it while the model's parameters stay, and its scatter over postures. `law`: dynamic stiffness at a frequency (Hz), of which
-/// a series spot adds the compliances. Postures are averaged in what is added, where noise does not bend the values.
+/// for beyond it while the model's parameters stay, and its scatter over postures. `law`: dynamic stiffness at a frequency (Hz). To first
+/// order in what is added, so that noise does not bend the values: z = −g and, at a series spot, 1/κ = g.
 pub fn draw_beyond(responses: &SpotResponses, law: impl Fn(f64) -> Complex64) -> (Vec<CurvePoint>, f64) {
     let is_series = responses.spots[0].is_series();
     let (mut scatter, mut freedom) = (0.0, 0usize);
     let points = common_lines(responses)
         .into_iter()
         .map(|(frequency_hz, lines)| {
-            let each = lines.iter().filter_map(|&l| {
-                let at = responses.line(l, 0).0;
-                beyond(at, at.on_residual / at.strength, is_series)
-            });
-            let own: Vec<(Complex64, f64)> = each.collect();
+            let each = lines.iter().map(|&l| responses.line(l, 0).0);
+            let own: Vec<(Complex64, f64)> = each
+                .filter(|at| at.strength > 0.0)
+                .map(|at| (at.on_residual / at.strength, at.strength))
+                .collect();
             let mean = Mean::of(&own);
             scatter += mean.scatter;
             freedom += own.len().saturating_sub(1);
             let law = law(frequency_hz);
-            let (stiffness, slope) = if is_series {
-                let all = (law.inv() + mean.value).inv();
-                (all, all.norm_sqr().max(law.norm_sqr()))
-            } else {
-                (law + mean.value, 1.0)
-            };
+            let slope = if is_series { law * law } else { Complex64::ONE };
             CurvePoint {
                 frequency_hz,
-                stiffness,
-                std: slope * mean.std(),
+                stiffness: law - slope * mean.value,
+                std: slope.norm() * mean.std(),
             }
         })
         .collect();
@@ -253,24 +248,16 @@ fn curve(
 
 /// Dynamic stiffness and its weight (1/variance) from the strength g of the pattern.
 fn stiffness(at: &SpotLine, g: Complex64, series: bool) -> Option<(Complex64, f64)> {
-    let (added, weight) = beyond(at, g, series)?;
-    if !series {
-        return Some((added, weight));
-    }
-    // κ = 1/g − Z, the inverse of the compliance
-    let z = added.inv();
-    let weight = weight / z.norm_sqr().powi(2);
+    let (z, slope) = if series {
+        // κ = 1/g − Z, dκ/dg = −1/g²
+        (g.inv() - at.own, 1.0 / g.norm_sqr())
+    } else {
+        // z = −g/(1 + g Y), dz/dg = −1/(1 + g Y)²
+        let factor = 1.0 + g * at.own;
+        (-g / factor, 1.0 / factor.norm_sqr())
+    };
+    let weight = at.strength / (slope * slope);
     (z.is_finite() && weight.is_finite() && weight > 0.0).then_some((z, weight))
-}
-
-/// What stands beside all that the model has there, and its weight: a dynamic stiffness, at a series spot a compliance.
-fn beyond(at: &SpotLine, g: Complex64, series: bool) -> Option<(Complex64, f64)> {
-    // z = −g/(1 + g Y), dz/dg = −1/(1 + g Y)²; 1/κ = g/(1 − g Z), d(1/κ)/dg = 1/(1 − g Z)²
-    let sign = if series { -1.0 } else { 1.0 };
-    let factor = 1.0 + sign * g * at.own;
-    let added = -sign * g / factor;
-    let weight = at.strength * factor.norm_sqr().powi(2);
-    (added.is_finite() && weight.is_finite() && weight > 0.0).then_some((added, weight))
 }
 
 /// Starting values of a mass on a spring from a drawn curve, best first: (mass kg, frequency Hz, damping ratio).

@@ -107,6 +107,11 @@ impl Parameter {
         }
     }
 
+    /// Natural value → solver scale, moved to the nearest end where it lies outside the range.
+    pub fn internal_within(&self, value: f64) -> f64 {
+        self.internal(value.clamp(self.bounds[0], self.bounds[1]))
+    }
+
     /// Solver scale → natural value.
     pub fn natural(&self, theta: f64) -> f64 {
         match self.scale {

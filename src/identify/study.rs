@@ -462,9 +462,7 @@ pub fn own_starts<S: Study>(
         )
         .map(|start| {
             let pairs = parameters.iter().zip(start);
-            pairs
-                .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
-                .collect()
+            pairs.map(|(p, v)| p.internal_within(v)).collect()
         })
         .collect();
     if let [only] = parameters {

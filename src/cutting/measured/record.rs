@@ -628,13 +628,20 @@ impl TurnOrders {
         if !self.shows_teeth() {
             return None;
         }
-        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
-        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        let (orders, std) = self.lines();
         tooth_passing_too_weak(
             &self.milling,
             orders,
             std,
             self.zero_is_known.then_some(self.mean),
+        )
+    }
+
+    /// Orders by axis, and their standard deviations.
+    fn lines(&self) -> ([&[Complex64]; 2], [&[f64]; 2]) {
+        (
+            self.orders.each_ref().map(Vec::as_slice),
+            self.std.each_ref().map(Vec::as_slice),
         )
     }
 
@@ -645,8 +652,7 @@ impl TurnOrders {
 
     /// The forces come back as often per turn as a tool with fewer teeth makes them.
     fn fewer_teeth(&self) -> Option<usize> {
-        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
-        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        let (orders, std) = self.lines();
         let found = || fewer_teeth(&self.milling, orders, std, self.mean, self.zero_is_known);
         self.shows_teeth().then(found).flatten()
     }
@@ -656,8 +662,7 @@ impl TurnOrders {
         if !self.milling.places.is_empty() || is_noise(&self.over_noise) {
             return None;
         }
-        let orders = [0, 1].map(|axis| self.orders[axis].as_slice());
-        let std = [0, 1].map(|axis| self.std[axis].as_slice());
+        let (orders, std) = self.lines();
         let known = (self.mean, self.zero_is_known);
         let chip_mm = uneven_chip_mm(&self.milling, orders, std, known, &self.air_power)?;
         Some(UnevenTeeth::new(&self.milling, chip_mm))
@@ -761,8 +766,7 @@ fn teeth_notice(
         return;
     }
     let (milling, mean, zero_is_known) = (&of_turn.milling, of_turn.mean, of_turn.zero_is_known);
-    let orders = [0, 1].map(|axis| of_turn.orders[axis].as_slice());
-    let std = [0, 1].map(|axis| of_turn.std[axis].as_slice());
+    let (orders, std) = of_turn.lines();
     if !milling.places.is_empty() {
         let other = other_than_listed(milling, orders, std, mean, zero_is_known);
         if let Some(other) = other {

@@ -127,11 +127,8 @@ pub(crate) fn tooth_passing_too_weak(
     let measured = (twice / (once + noise(teeth))).sqrt();
     let is_strongest = (1..2 * teeth).all(|k| power(k) < twice);
     let lacks = mean.is_some_and(|mean| {
-        let n = teeth as f64;
-        let single = single_tooth(cut).closed_form(teeth);
-        let promised = direction(&single, n, orders, mean, true);
-        let promised = promised.map(|direction| n * n * power_of_chip(&single, teeth, direction));
-        promised.is_some_and(|promised| once < LACKING * LACKING * promised)
+        let promised = promised_powers(cut, orders, mean, true);
+        promised.is_some_and(|promised| once < LACKING * LACKING * promised[teeth - 1])
     });
     let told = (is_strongest || lacks)
         && twice > CERTAIN * CERTAIN * noise(2 * teeth)
@@ -201,13 +198,10 @@ pub(crate) fn fewer_teeth(
         let outside: f64 = (1..=count).filter(|k| !in_step(k)).map(power).sum();
         let is_certain = power(*teeth) > CERTAIN * CERTAIN * noise_of(std, *teeth);
         let others_idle = || {
-            let unit = single_tooth(cut).closed_form(listed);
-            let n = listed as f64;
-            direction(&unit, n, orders, mean, zero_is_known).is_some_and(|direction| {
-                let of_tooth = |k: usize| power_of_chip(&unit, k, direction);
-                let strongest = (1..=listed).map(of_tooth).fold(0.0, f64::max);
-                of_tooth(*teeth) > HAS_A_LINE * strongest
-                    && power(*teeth) > TAKEN_OVER * n * n * of_tooth(*teeth)
+            promised_powers(cut, orders, mean, zero_is_known).is_some_and(|promised| {
+                let strongest = promised.iter().copied().fold(0.0, f64::max);
+                let own = promised[teeth - 1];
+                own > HAS_A_LINE * strongest && power(*teeth) > TAKEN_OVER * own
             })
         };
         let is_clear = is_certain && outside < OUT_OF_STEP * inside;
@@ -434,6 +428,21 @@ fn single_tooth(cut: &MillingCut) -> MillingCut {
         places: Vec::new(),
         ..cut.clone()
     }
+}
+
+/// Powers of orders 1 to the number of teeth, N², as if all teeth added up there: those of one tooth with the force that [`direction`]
+/// has, times their number squared.
+fn promised_powers(
+    cut: &MillingCut,
+    orders: [&[Complex64]; 2],
+    mean: [f64; 2],
+    zero_is_known: bool,
+) -> Option<Vec<f64>> {
+    let n = cut.teeth as f64;
+    let single = single_tooth(cut).closed_form(cut.teeth);
+    let direction = direction(&single, n, orders, mean, zero_is_known)?;
+    let powers = (1..=cut.teeth).map(|k| n * n * power_of_chip(&single, k, direction));
+    Some(powers.collect())
 }
 
 /// Tangential and radial force for a chip of 1 mm and 1 mm of depth, as the means have it; with an unknown zero as the

@@ -641,12 +641,7 @@ impl<'a> Sought<'a> {
                     .chain(alike)
                     .chain([usual])
                     .chain(proposed.into_iter().take(4))
-                    .map(|start| {
-                        own.iter()
-                            .zip(start)
-                            .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
-                            .collect()
-                    })
+                    .map(|start| own.iter().zip(start).map(|(p, v)| p.internal_within(v)).collect())
                     .collect();
                 let fits = look(study, &extended, &bases, &starts, effort).ok()?;
                 Some(Looked {
@@ -834,7 +829,7 @@ fn two_resonators(
         .into_iter()
         .map(|second| {
             let second = of_second.iter().zip(second);
-            let second = second.map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
+            let second = second.map(|(p, v)| p.internal_within(v));
             own.iter().copied().chain(second).collect()
         })
         .collect();
@@ -880,7 +875,7 @@ fn along_its_axis(
     let own = study.extend(model, &instance).parameters[count..]
         .iter()
         .zip(values)
-        .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])))
+        .map(|(p, v)| p.internal_within(v))
         .collect::<Vec<f64>>();
     let start = [front, &own].concat();
     let renamed = fit_from(study, model, &instance, &start, View::COARSE, REFINE).ok()?;

@@ -46,7 +46,7 @@ pub fn named(
                     let mut drawn = best.parts().flat_map(|part| &part.parameters);
                     // `branch@link-3.x.mass_kg`
                     let drawn = drawn.find(|d| d.name.rsplit('.').next() == p.name.rsplit('.').next());
-                    drawn.map_or(start, |d| p.internal(d.value.clamp(p.bounds[0], p.bounds[1])))
+                    drawn.map_or(start, |d| p.internal_within(d.value))
                 });
                 best.theta[..count].iter().copied().chain(own).collect()
             })

@@ -349,10 +349,7 @@ fn imitate(
         };
         let mut ranked: Vec<(f64, Vec<f64>)> = starts
             .map(|start| {
-                let inside = own
-                    .iter()
-                    .zip(start)
-                    .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
+                let inside = own.iter().zip(start).map(|(p, v)| p.internal_within(v));
                 let full: Vec<f64> = truth.baseline.theta.iter().copied().chain(inside).collect();
                 (problem.cost(&full).unwrap_or(f64::INFINITY), full)
             })

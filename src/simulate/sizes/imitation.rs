@@ -93,10 +93,7 @@ fn refit(
     let mut ranked: Vec<(f64, Vec<f64>)> = starts
         .into_iter()
         .map(|start| {
-            let values = own
-                .iter()
-                .zip(start)
-                .map(|(p, v)| p.internal(v.clamp(p.bounds[0], p.bounds[1])));
+            let values = own.iter().zip(start).map(|(p, v)| p.internal_within(v));
             let full: Vec<f64> = theta.iter().copied().chain(values).collect();
             let cost = levenberg_marquardt::LeastSquares::cost(&problem, &full).unwrap_or(f64::INFINITY);
             (cost, full)

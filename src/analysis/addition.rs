@@ -65,7 +65,7 @@ impl Entry<'_> {
 }
 
 impl<D: CampaignSide> Addition<D> {
-    /// Adds the effect `name` (`EFFECT[@SITE]`) to the campaign's model, refits everything and records the revision.
+    /// Adds the effect `name` (`EFFECT[@SITE][:choice=value]`) to the campaign's model, refits everything and records the revision.
     ///
     /// # Errors
     /// No such effect or site, one that is in the model already or that this data cannot show; a fit that fails; a log
@@ -97,8 +97,12 @@ impl<D: CampaignSide> Addition<D> {
         // Taken with the data that were read, not after the fit.
         let fingerprint = campaign.fingerprint(D::SIDE)?;
         let instances = effects::requested(&D::registry(), &D::known(&case), name)?;
-        if case.model.has(name) {
-            return Err(InputError::new(format!("{name} is in the model already"))
+        if let Some(known) = instances
+            .iter()
+            .map(|i| i.label())
+            .find(|label| case.model.has(label))
+        {
+            return Err(InputError::new(format!("{known} is in the model already"))
                 .key("EFFECT")
                 .remedy(format!(
                     "the model is: {}; see what else is missing with `lobestone diagnose {}`",

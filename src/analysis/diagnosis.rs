@@ -88,7 +88,7 @@ impl<D: CampaignSide> Findings<D> {
         };
         // What the data draw may have a name after all.
         if let Some(found) = &lead
-            && let Some(named) = D::named(&case, &study, found)?
+            && let Some(named) = D::named(&case, &study, &diagnosis, found)?
         {
             let again = diagnose_from(&study, &case.model, named)?;
             if again.verdict == DiagnosisVerdict::Effect {

@@ -71,7 +71,7 @@ pub trait CampaignSide: Modelled {
         now: &Self::View,
     ) -> Result<Option<Self::Lead>>;
 
-    /// An effect of the library that a diagnosis missed, by what `lead` has found, and a point from which it is seen (the model's
+    /// An effect of the library that `diagnosis` missed, by what `lead` has found, and a point from which it is seen (the model's
     /// parameters and its own, solver's scale).
     ///
     /// # Errors
@@ -79,6 +79,7 @@ pub trait CampaignSide: Modelled {
     fn named(
         _case: &Case<Self>,
         _study: &Self::Study,
+        _diagnosis: &Diagnosis<Self>,
         _lead: &Self::Lead,
     ) -> Result<Option<(Instance<Self>, Vec<f64>)>> {
         Ok(None)

@@ -109,10 +109,11 @@ impl CampaignSide for Structure {
     fn named(
         case: &StructureCase,
         study: &StructureStudy,
+        diagnosis: &Diagnosis<Structure>,
         lead: &StructureLead,
     ) -> Result<Option<(Instance<Structure>, Vec<f64>)>> {
         match &lead.place {
-            Some(found) => named(study, &case.model, found),
+            Some(found) => named(study, &case.model, found, &diagnosis.candidates),
             None => Ok(None),
         }
     }

@@ -164,6 +164,15 @@ impl<D: Domain> Instance<D> {
         self.name().label()
     }
 
+    /// How a user asks for just this one: the label, and the discrete choice where there is one
+    /// (`branch@link-3.z:form=resonator`).
+    pub fn request(&self) -> String {
+        match self.variant_label() {
+            Some((key, value)) => format!("{}:{key}={value}", self.label()),
+            None => self.label(),
+        }
+    }
+
     /// For people: the label, and the discrete choice where there is one.
     pub fn title(&self) -> String {
         match self.variant_label() {

@@ -160,6 +160,11 @@ impl<D: Domain> Registry<D> {
         self.effects().find(|e| e.id() == id)
     }
 
+    /// The effect that `EFFECT[@SITE][:choice=value]` begins with.
+    pub fn effect_of(&self, request: &str) -> Option<&'static dyn Effect<D>> {
+        self.effect(request.split(['@', ':']).next()?)
+    }
+
     /// Every instance that a diagnosis tries on this object, discrete choices included.
     pub fn instances(&self, object: &D::Object) -> Vec<Instance<D>> {
         let of = |effect: &&'static dyn Effect<D>| instances_of(*effect, object);

@@ -1,4 +1,4 @@
-//! What a user means by `EFFECT[@SITE]`.
+//! What a user means by `EFFECT[@SITE][:choice=value]`.
 
 use super::effect::{Domain, Effect, Instance, Known};
 use super::registry::Registry;
@@ -6,17 +6,22 @@ use super::site::Site;
 use crate::text::{closest, shown_briefly};
 use crate::{InputError, Result};
 
-/// The instances (one for each discrete choice) of an effect that a user asked for.
+/// The instances of an effect that a user asked for: one for each discrete choice, or that of the choice that is stated
+/// (`branch@link-3.z:form=resonator`).
 ///
 /// # Errors
-/// One that says what there is where the effect or its site is none, or a site is missing; the reason where this robot
-/// or this data cannot show the effect.
+/// One that says what there is where the effect, its site or the choice is none, or a site is missing; the reason where
+/// this robot or this data cannot show the effect.
 pub fn requested<D: Domain>(
     registry: &Registry<D>,
     known: &Known<'_, D>,
     name: &str,
 ) -> Result<Vec<Instance<D>>> {
     let wrong = |problem: String, remedy: String| InputError::new(problem).key("EFFECT").remedy(remedy);
+    let (name, choice) = match name.split_once(':') {
+        Some((name, choice)) => (name, Some(choice)),
+        None => (name, None),
+    };
     let (id, site) = match name.split_once('@') {
         Some((id, site)) => (id, Some(site)),
         None => (name, None),
@@ -37,7 +42,20 @@ pub fn requested<D: Domain>(
         let remedy = "measure what it needs, or see what `lobestone diagnose DIR` proposes".to_string();
         return Err(wrong(format!("this campaign cannot show {name}: {obstacle}"), remedy).into());
     }
-    Ok(found)
+    let Some(choice) = choice else { return Ok(found) };
+    let chosen = |instance: &&Instance<D>| {
+        instance
+            .variant_label()
+            .is_some_and(|(key, value)| choice.split_once('=') == Some((key, value)))
+    };
+    match found.iter().find(chosen) {
+        Some(instance) => Ok(vec![*instance]),
+        None => {
+            let all: Vec<String> = found.iter().map(Instance::request).collect();
+            let problem = format!("{name} has no choice \"{}\"", shown_briefly(choice));
+            Err(wrong(problem, format!("write {}", all.join(" or "))).into())
+        }
+    }
 }
 
 fn no_such_site<D: Domain>(effect: &dyn Effect<D>, site: Option<&str>, sites: &[Site]) -> (String, String) {
@@ -93,7 +111,20 @@ mod tests {
             let found = requested(&Registry::structure(), &Known::robot(&robot, DATA), name).unwrap();
             assert_eq!(found.len(), count, "{name}");
             assert!(found.iter().all(|i| i.label() == name));
+            // What one of them is called asks for that one.
+            for instance in &found {
+                let own = requested(
+                    &Registry::structure(),
+                    &Known::robot(&robot, DATA),
+                    &instance.request(),
+                );
+                assert_eq!(own.unwrap(), [*instance], "{name}");
+            }
         }
+        let name = "branch@link-3.z:form=resonator";
+        let found = requested(&Registry::structure(), &Known::robot(&robot, DATA), name).unwrap();
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].request(), name);
     }
 
     #[test]
@@ -109,6 +140,12 @@ mod tests {
                 "local-resonator@link-3",
             ),
             ("payload@link-2", "nowhere in particular", "write payload"),
+            (
+                "local-resonator@link-3:direction=w",
+                "has no choice \"direction=w\"",
+                "local-resonator@link-3:direction=x",
+            ),
+            ("payload:form=spring", "has no choice", "write payload"),
             (
                 "amplitude-dependent-stiffness@joint-1",
                 "two hammer levels",

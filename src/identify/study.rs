@@ -262,7 +262,7 @@ pub enum Effort {
     Direct,
     /// Besides, the rough misfit leads from every base where the likelihood's starting points are all far off.
     Staged,
-    /// The same on a glance at the data, for what is so large that it shows there.
+    /// The same on a glance at the data and from the two nearest bases, for what is so large that it shows there.
     StagedAtAGlance,
 }
 
@@ -374,9 +374,13 @@ pub fn look<S: Study>(
             max_iterations: 10,
             ..LOOK
         };
-        let near = bases
-            .iter()
-            .filter_map(|base| lowest(&rough, base))
+        let mut near: Vec<(f64, Vec<f64>)> = bases.iter().filter_map(|base| lowest(&rough, base)).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if effort == Effort::StagedAtAGlance {
+            near.truncate(2);
+        }
+        let near = near
+            .into_iter()
             .filter_map(|(_, start)| minimise(&rough, &start, &bounds, longer).ok())
             .min_by(|a, b| a.cost.total_cmp(&b.cost));
         if let Some(near) = near {

@@ -344,11 +344,17 @@ pub fn structure(
                         place: Some(lead), ..
                     }),
                 ) => match lead.places.first().and_then(|p| p.best.as_ref()) {
-                    Some(best) => format!(
-                        "look at what the data draw: `lobestone localise {dir}`; to put it into the model: `lobestone add \
-                         {dir} {}`",
-                        best.first.instance.label()
-                    ),
+                    Some(best) => {
+                        let requests = best.requests();
+                        let commands: Vec<String> = requests
+                            .iter()
+                            .map(|r| format!("`lobestone add {dir} {r}`"))
+                            .collect();
+                        format!(
+                            "look at what the data draw: `lobestone localise {dir}`; to put it into the model: {}",
+                            commands.join(", then ")
+                        )
+                    }
                     None => format!("{}", found.next_measurement),
                 },
                 _ => format!("{}", found.next_measurement),

@@ -211,7 +211,7 @@ impl PageSubject for CampaignBench {
             PageOrder::Diagnose { .. } => "the diagnosis".into(),
             PageOrder::Add { side, head, effect } => {
                 log_at(&self.dir, *side, head)?;
-                let cutting = Registry::cutting().effect(effect).is_some();
+                let cutting = Registry::cutting().effect_of(effect).is_some();
                 if cutting != (*side == Side::Cutting) {
                     return Err(Refusal::Impossible(format!(
                         "\"{effect}\" is no effect of this side of the campaign"

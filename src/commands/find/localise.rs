@@ -37,13 +37,12 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     let best = found.places.first();
     let next = match best.and_then(|p| p.best.as_ref()) {
         Some(form) if found.significant => {
-            let then = form.second.as_ref().map_or(String::new(), |second| {
-                format!(", then `lobestone add {dir} {}`", second.instance.label())
-            });
-            format!(
-                "run `lobestone add {dir} {}` to put it into the model{then}",
-                form.first.instance.label()
-            )
+            let commands: Vec<String> = form
+                .requests()
+                .iter()
+                .map(|r| format!("`lobestone add {dir} {r}`"))
+                .collect();
+            format!("run {} to put it into the model", commands.join(", then "))
         }
         _ => format!("nothing to add here; `lobestone compare {dir}` shows where the model fails"),
     };
@@ -143,7 +142,7 @@ impl<'a> PlaceDrawn<'a> {
         let (parameters, errors) = best.map(|b| by_name(&b.first.parameters)).unwrap_or_default();
         PlaceDrawn {
             place: p.spot.label(),
-            add: best.map(|b| b.first.instance.label()),
+            add: best.and_then(|b| b.requests().into_iter().next()),
             left: p.left,
             consistency: p.consistency,
             held_out_nrms: best.and_then(|b| b.held_out.as_ref().map(HeldOut::nrms)),
@@ -161,7 +160,7 @@ impl<'a> PlaceDrawn<'a> {
             delta_bic: best.map(|b| b.delta_bic),
             p_value: best.map(|b| b.p_value),
             tied_with: &p.tied_with,
-            second: best.and_then(|b| b.second.as_ref()).map(SecondDrawn::of),
+            second: best.and_then(SecondDrawn::of),
         }
     }
 }
@@ -183,15 +182,16 @@ struct SecondDrawn<'a> {
 }
 
 impl<'a> SecondDrawn<'a> {
-    fn of(second: &'a DrawnPart) -> Self {
+    fn of(best: &'a BestForm) -> Option<Self> {
+        let second = best.second.as_ref()?;
         let (parameters, errors) = by_name(&second.parameters);
-        SecondDrawn {
+        Some(SecondDrawn {
             place: second.spot.label(),
-            add: second.instance.label(),
+            add: second.instance.request(),
             form: second.form().label(),
             parameters,
             errors,
-        }
+        })
     }
 }
 

@@ -22,8 +22,9 @@ use crate::revision::{RevisionLog, Side};
 pub struct AddArgs {
     #[command(flatten)]
     campaign: CampaignArg,
-    /// The effect and, where it has one, its site: payload, local-resonator@link-3.
-    #[arg(value_name = "EFFECT[@SITE]")]
+    /// The effect and, where it has one, its site: payload, local-resonator@link-3. Where there is a choice, the best is taken unless
+    /// it is stated: branch@link-3.z:form=resonator.
+    #[arg(value_name = "EFFECT[@SITE][:choice=value]")]
     effect: String,
 }
 
@@ -35,7 +36,7 @@ pub fn run(args: AddArgs) -> Result<Outcome> {
 
 /// Adds `effect` if the campaign's log still is `log` in the end.
 pub fn after(log: RevisionLog, campaign: &Campaign, effect: &str) -> Result<Outcome> {
-    if Registry::cutting().effect(effect).is_some() {
+    if Registry::cutting().effect_of(effect).is_some() {
         let addition = Addition::<Cutting>::after(log, campaign, effect, Options::default())?;
         let parameters = describe_estimates(&addition.extension.after.calibration);
         return Ok(outcome(&addition, parameters, Guide::cutting(campaign)));

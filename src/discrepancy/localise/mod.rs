@@ -120,6 +120,17 @@ impl BestForm {
         std::iter::once(&self.first).chain(&self.second)
     }
 
+    /// What to `add`, in order. The first of two is asked for by its form: alone, another one may seem to do for both.
+    pub fn requests(&self) -> Vec<String> {
+        let is_alone = self.second.is_none();
+        self.parts()
+            .map(|part| match is_alone {
+                true => part.instance.label(),
+                false => part.instance.request(),
+            })
+            .collect()
+    }
+
     /// `a resonator on link 5 along z`; `of_part` stands behind each form.
     pub fn in_words(&self, of_part: impl Fn(&DrawnPart) -> String) -> String {
         let part = |p: &DrawnPart| {
@@ -169,9 +180,11 @@ const LEAST_SHARE: f64 = 0.1;
 const FITTED: usize = 10;
 /// … and such as promise most at each other starting point.
 const FITTED_ELSEWHERE: usize = 5;
-/// Forms of all places, and of a second displacement, that are followed beyond their first steps.
+/// Forms of all places that are followed beyond their first steps.
 const FOLLOWED: usize = 24;
+/// Forms of a second displacement that are, and those of them that all data may have to judge.
 const SECOND_FOLLOWED: usize = 6;
+const SECOND_JUDGED: usize = 4;
 /// Places whose curves leave the same to so many parts are one place to these data.
 const SAME_LEFT: f64 = 1e-6;
 /// Places at which a second displacement is tried, and displacements that are tried there.
@@ -180,6 +193,8 @@ const SECOND: [usize; 2] = [4, 2];
 const SECOND_FROM: f64 = 1.02;
 /// … and from which on more than noise is left.
 const LEFT_OVER: f64 = 1.1;
+/// Times what the best place leaves, where that is next to nothing, from which on a second displacement does not help another.
+const LEFT_FAR_MORE: f64 = 1.5;
 /// Places whose best form is fitted to all data.
 const SETTLED: usize = 4;
 /// Lines of all postures together that the screen looks at.
@@ -253,11 +268,16 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         })
         .collect();
     chosen.extend(supports);
+    let own_forms = forms_of_its_own(&screened, &ties, &chosen);
+    chosen.extend(own_forms);
     let base_count = model.parameters.len();
     let bic = |t: &Tried<Structure>| {
         2.0 * (t.fit.cost - coarse_base.cost) + (t.fit.theta.len() - base_count) as f64 * values.ln()
     };
-    let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
+    let better = |a: &Tried<Structure>, b: &Tried<Structure>| {
+        let merit = |tried| merit(study, tried, base_count, Extent::Coarse);
+        order(&merit(a), &merit(b))
+    };
     let mut by_place: BTreeMap<usize, Vec<Tried<Structure>>> = BTreeMap::new();
     for (place, tried) in try_all(study, model, &chosen, place_of) {
         by_place.entry(place).or_default().push(tried);
@@ -283,25 +303,36 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .first()
         .map_or(f64::INFINITY, |(_, forms)| forms[0].fit.cost);
     let is_enough = 2.0 * least <= SECOND_FROM * values;
-    // Of a place that leaves next to nothing, what is found second is faint: sought at the best alone, and not after a large first one.
-    let sought_at = match (is_enough, is_far) {
-        (false, _) => SECOND[0],
-        (true, false) => 1,
-        (true, true) => 0,
+    // Of a place that leaves next to nothing, what is found second is faint: sought at the best alone.
+    let sought_at = if is_enough { 1 } else { SECOND[0] };
+    // The coarse view shows too little of what is faint.
+    let is_faint = 2.0 * least <= LEFT_OVER * values;
+    let (extent, elsewhere) = match is_faint {
+        // With the first in the model it is no longer far off.
+        true => (Extent::Full, &[][..]),
+        false => (Extent::Coarse, &starts.elsewhere[..]),
     };
+    let merit = |tried: &Tried<Structure>| merit(study, tried, base_count, extent);
+    let in_question = |forms: &[Tried<Structure>]| !is_faint || forms[0].fit.cost <= LEFT_FAR_MORE * least;
     let second: Vec<Option<Second>> = fitted
         .par_iter()
         .take(sought_at)
         .map(|(i, forms)| {
+            if !in_question(forms) {
+                return None;
+            }
             let spot = screened[*i].spot;
-            let other = second_form(study, (model, &thinned), forms, spot, &starts.elsewhere);
+            let mut found = second_form(study, (model, &thinned), forms, spot, elsewhere);
+            if !is_faint {
+                found.truncate(1);
+            }
             let same = two_resonators(study, (model, &thinned), &forms[0], spot);
-            let same = same.map(|tried| Second::Instead(spot, tried));
-            let best = other
-                .into_iter()
-                .chain(same)
-                .min_by(|a, b| better(a.tried(), b.tried()))?;
-            better(best.tried(), &forms[0]).is_lt().then_some(best)
+            found.extend(same.map(|tried| Second::Instead(spot, tried)));
+            let judged = found
+                .into_par_iter()
+                .map(|second| (merit(second.tried()), second));
+            let (best, second) = judged.min_by(|a, b| order(&a.0, &b.0))?;
+            order(&best, &merit(&forms[0])).is_lt().then_some(second)
         })
         .collect();
     let mut fitted: Vec<Fitted> = fitted
@@ -320,8 +351,10 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
                 match fitted.iter_mut().find(|f| f.place == place) {
                     Some(known) => {
                         known.forms.retain(|t| t.instance != tried.instance);
-                        known.forms.push(tried);
-                        known.forms.sort_by(better);
+                        known.forms.insert(0, tried);
+                        if !is_faint {
+                            known.forms.sort_by(better);
+                        }
                     }
                     None => fitted.push(Fitted {
                         place,
@@ -390,8 +423,9 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     );
     for place in &mut places {
         let own = screened.iter().position(|s| s.spot == place.spot);
+        // Those that were fitted themselves are tied where their fits are.
         let same = |(i, s): &(usize, &Screened)| {
-            s.spot != place.spot && own.is_some_and(|own| ties[*i] == ties[own])
+            s.spot != place.spot && !known.contains(&s.spot) && own.is_some_and(|own| ties[*i] == ties[own])
         };
         let tied = screened.iter().enumerate().filter(same);
         place.tied_with.extend(tied.map(|(_, s)| s.spot.label()));
@@ -545,6 +579,26 @@ fn unseen_supports<'a>(
         let is_sought = is_known(i) || (leans && screened.iter().enumerate().any(shares));
         (ties[i] == i && !is_sought).then_some((i, form))
     })
+}
+
+/// What stands at places that kinematics makes one with the chosen, and can be only there: a rotor behind the gear of joint 1, but not
+/// under the base.
+fn forms_of_its_own<'a>(
+    screened: &'a [Screened],
+    ties: &[usize],
+    chosen: &[(usize, Sought<'a>)],
+) -> Vec<(usize, Sought<'a>)> {
+    let at_tied = chosen.iter().flat_map(|(place, sought)| {
+        let others = screened.iter().enumerate();
+        let tied = others.filter(move |(i, _)| i != place && ties[*i] == ties[*place]);
+        tied.map(|(i, other)| {
+            let mut own = Sought::new(other, sought.starts.clone());
+            own.forms
+                .retain(|form| !drawn::forms(sought.screened.spot).contains(form));
+            (i, own)
+        })
+    });
+    at_tied.filter(|(_, own)| !own.forms.is_empty()).collect()
 }
 
 /// What is tried wherever a support may give way, along the axis of a bearing or alike both ways across it, or one be there that the
@@ -735,44 +789,58 @@ fn at_bound(fit: &Fit, base_count: usize) -> bool {
     (base_count..fit.theta.len()).any(|i| fit.at_bound.contains(&i))
 }
 
-/// Order of fits on the coarse view, of so many real values: a form whose size ran to the end of its range stands for another.
-fn by_bound_then_bic(
-    a: &Tried<Structure>,
-    b: &Tried<Structure>,
-    base_count: usize,
-    values: f64,
-) -> std::cmp::Ordering {
-    let bic = |t: &Tried<Structure>| 2.0 * t.fit.cost + t.fit.theta.len() as f64 * values.ln();
-    let bound = |t: &Tried<Structure>| at_bound(&t.fit, base_count);
-    bound(a).cmp(&bound(b)).then(bic(a).total_cmp(&bic(b)))
+/// How good a fit is, the less the better: whether a size ran to the end of its range, since a form whose size did stands for another;
+/// then BIC. On the coarse view, on which it was made, or fitted again to all data.
+fn merit(study: &StructureStudy, tried: &Tried<Structure>, base_count: usize, extent: Extent) -> (bool, f64) {
+    let values = study.real_values(extent) as f64;
+    let of = |fit: &Fit| {
+        let bic = 2.0 * fit.cost + fit.theta.len() as f64 * values.ln();
+        (at_bound(fit, base_count), bic)
+    };
+    let Tried { model, fit, .. } = tried;
+    match extent {
+        Extent::Full => {
+            let problem = study.problem(model, View::FULL);
+            let fit = minimise(&problem, &fit.theta, &model.bounds(), REFINE);
+            fit.as_ref().map_or((true, f64::INFINITY), of)
+        }
+        _ => of(fit),
+    }
+}
+
+fn order(a: &(bool, f64), b: &(bool, f64)) -> std::cmp::Ordering {
+    a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
 }
 
 /// A second form beside the best of `forms`, at the displacement of the same place that promises most with the first in the model;
-/// fitted from `elsewhere`, too, points of the model without either. `bare`: that model, and thinned data.
+/// fitted from `elsewhere`, too, points of the model without either. `bare`: that model, and thinned data. Best first by the coarse view.
 fn second_form(
     study: &StructureStudy,
     (bare, thinned): (&StructureModel, &FrfData),
     forms: &[Tried<Structure>],
     spot: Spot,
     elsewhere: &[Vec<f64>],
-) -> Option<Second> {
+) -> Vec<Second> {
     let base_count = bare.parameters.len();
     // Two resonators at one displacement may have stood for one at each of two.
     let law = |t: &Tried<Structure>| drawn::form_of(t.instance.variant);
     let first = match law(&forms[0]) {
         // It has its direction in all three already.
-        DrawnForm::ObliqueSpringDamper => return None,
-        DrawnForm::TwoResonators => forms.iter().find(|t| law(t) == DrawnForm::Resonator)?,
+        DrawnForm::ObliqueSpringDamper => None,
+        DrawnForm::TwoResonators => forms.iter().find(|t| law(t) == DrawnForm::Resonator),
         // Its stiffness along the second axis may be another one.
-        form if form.is_isotropic() => forms.iter().find(|t| !law(t).is_isotropic())?,
-        _ => &forms[0],
+        form if form.is_isotropic() => forms.iter().find(|t| !law(t).is_isotropic()),
+        _ => forms.first(),
     };
+    let Some(first) = first else { return Vec::new() };
     let (model, theta) = (&first.model, &first.fit.theta);
     let spots: Vec<Spot> = free_spots(model)
         .into_iter()
         .filter(|other| other.shares_place_with(spot))
         .collect();
-    let mut promising = screen_at(model, theta, thinned, &spots).ok()?;
+    let Ok(mut promising) = screen_at(model, theta, thinned, &spots) else {
+        return Vec::new();
+    };
     promising.sort_by(|a, b| a.left_free.total_cmp(&b.left_free));
     let own = &theta[base_count..];
     let starts = Starts {
@@ -787,7 +855,7 @@ fn second_form(
         forms.into_iter().map(|form| (second.spot, form))
     });
     let (spots, looked): (Vec<Spot>, Vec<Looked<Structure>>) = looked.unzip();
-    let pairs = spots
+    let mut pairs: Vec<Pair> = spots
         .into_iter()
         .zip(race(study, looked, SECOND_FOLLOWED))
         .filter_map(|(second, tried)| {
@@ -797,15 +865,17 @@ fn second_form(
                 second,
                 tried: tried?,
             })
-        });
-    let values = study.real_values(Extent::Coarse) as f64;
-    let better = |a: &Tried<Structure>, b: &Tried<Structure>| by_bound_then_bic(a, b, base_count, values);
-    let pair = pairs.min_by(|a, b| better(&a.tried, &b.tried))?;
-    let alone = without_the_first(study, bare, &pair);
-    Some(match alone.filter(|alone| better(alone, &pair.tried).is_lt()) {
-        Some(alone) => Second::Instead(pair.second, alone),
-        None => Second::Beside(pair),
-    })
+        })
+        .collect();
+    let merit = |tried: &Tried<Structure>| merit(study, tried, base_count, Extent::Coarse);
+    pairs.sort_by(|a, b| order(&merit(&a.tried), &merit(&b.tried)));
+    let alone = pairs.first().and_then(|pair| {
+        let alone = without_the_first(study, bare, pair)?;
+        let is_enough = order(&merit(&alone), &merit(&pair.tried)).is_lt();
+        is_enough.then(|| Second::Instead(pair.second, alone))
+    });
+    let pairs = pairs.into_iter().map(Second::Beside);
+    alone.into_iter().chain(pairs).take(SECOND_JUDGED).collect()
 }
 
 /// A second resonator at the displacement where `first` is one, started from what is left with that.

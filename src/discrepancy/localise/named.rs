@@ -2,15 +2,18 @@
 
 use rayon::prelude::*;
 
-use super::Localisation;
+use super::{Localisation, REFINE};
 use crate::Result;
+use crate::discrepancy::candidate::EffectCandidate;
 use crate::effects::{Instance, Structure};
 use crate::identify::levenberg_marquardt::Stopping;
-use crate::identify::study::{Study, View, own_starts};
+use crate::identify::study::{Extent, Study, View, own_starts};
 use crate::identify::{LeastSquares, StructureModel, StructureStudy, minimise};
 
 /// Share of what the drawn form takes away that an effect must take away in a few steps to be worth another diagnosis.
 const ALIKE: f64 = 0.7;
+/// Share of its misfit by which its fit must be better than the one that is known.
+const NEWS: f64 = 1e-3;
 const FEW_STEPS: Stopping = Stopping {
     max_iterations: 8,
     relative_decrease: 1e-3,
@@ -18,7 +21,8 @@ const FEW_STEPS: Stopping = Stopping {
 
 /// The effect of the library that does nearly what the drawn form does at the best place of `found`, and its fit's parameters with
 /// those of `model` in front (solver's scale). What is missing may drive the joints so far that its own name is not seen from there,
-/// while the drawn form has put them right; sizes of the same name begin where it has them.
+/// while the drawn form has put them right; sizes of the same name begin where it has them. `None` where one of `tried`, what a
+/// diagnosis made of it, is as good already.
 ///
 /// # Errors
 /// A model that does not respond.
@@ -26,6 +30,7 @@ pub fn named(
     study: &StructureStudy,
     model: &StructureModel,
     found: &Localisation,
+    tried: &[EffectCandidate<Structure>],
 ) -> Result<Option<(Instance<Structure>, Vec<f64>)>> {
     let Some(best) = found.places.first().and_then(|place| place.best.as_ref()) else {
         return Ok(None);
@@ -57,7 +62,21 @@ pub fn named(
         Some((fit.cost, *instance, fit.theta))
     });
     let nearest = fits.min_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(nearest
-        .filter(|(cost, ..)| drawn < without && without - cost > ALIKE * (without - drawn))
-        .map(|(_, instance, theta)| (instance, theta)))
+    let nearest = nearest.filter(|(cost, ..)| drawn < without && without - cost > ALIKE * (without - drawn));
+    let Some((_, instance, theta)) = nearest else {
+        return Ok(None);
+    };
+    let Some(known) = tried.iter().find(|known| known.label() == instance.label()) else {
+        return Ok(Some((instance, theta)));
+    };
+    let extended = study.extend(model, &instance);
+    let fit = minimise(
+        &study.problem(&extended, View::FULL),
+        &theta,
+        &extended.bounds(),
+        REFINE,
+    )?;
+    let freedom = study.real_values(Extent::Full) as f64 - fit.theta.len() as f64;
+    let is_news = 2.0 * fit.cost < (1.0 - NEWS) * known.reduced_chi2 * freedom;
+    Ok(is_news.then_some((instance, fit.theta)))
 }

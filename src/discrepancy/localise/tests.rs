@@ -264,6 +264,53 @@ fn a_base_that_slides_both_ways_is_found_and_weighed() {
     );
 }
 
+/// Kinematics makes what gives way behind the gear of joint 1 and what turns under the base one place, but only one of them has a rotor.
+#[test]
+fn a_soft_servo_of_joint_1_is_a_rotor_behind_its_gear() {
+    let spot = Spot::Drive(1);
+    let truth = [1.8e6, 2.5e4, 450.0];
+    let found = found(Some((spot, DrawnForm::RotorOnSpring, &truth)), 17);
+    let place = &found.places[0];
+    assert!(
+        found.significant && place.spot == spot && place.left < 1.05,
+        "{:?} {}",
+        place.spot,
+        place.left
+    );
+    assert!(place.tied_with.is_empty(), "{:?}", place.tied_with);
+    for (estimate, truth) in place.best.as_ref().unwrap().first.parameters.iter().zip(truth) {
+        assert!((estimate.value / truth - 1.0).abs() < 0.15, "{estimate:?}");
+    }
+}
+
+/// A second axis that is so faint that the coarse view does not show it; what is asked for by its form is that form.
+#[test]
+fn a_faint_second_resonator_is_judged_by_all_data() {
+    let hidden = [
+        (
+            Spot::LinkAxis(3, 2),
+            DrawnForm::Resonator,
+            &[4.0, 22.3, 0.032][..],
+        ),
+        (
+            Spot::LinkAxis(3, 0),
+            DrawnForm::Resonator,
+            &[4.6, 30.8, 0.021][..],
+        ),
+    ];
+    let found = found_of(&hidden, 18);
+    let place = &found.places[0];
+    let best = place.best.as_ref().unwrap();
+    let spots: Vec<Spot> = best.parts().map(|part| part.spot).collect();
+    assert!(found.significant && place.left < 1.05, "{}", place.left);
+    assert!(hidden.iter().all(|(spot, ..)| spots.contains(spot)), "{spots:?}");
+    for part in best.parts() {
+        let request = part.instance.request();
+        assert!(best.requests().contains(&request), "{request}");
+        assert_eq!(request, format!("branch@{}:form=resonator", part.spot.label()));
+    }
+}
+
 #[test]
 fn nothing_is_drawn_where_nothing_is_missing() {
     for seed in [21, 22] {

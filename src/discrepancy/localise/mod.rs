@@ -234,7 +234,7 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         REFINE,
     )?;
     let values = study.real_values(Extent::Coarse) as f64;
-    let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values));
+    let starts = Starts::new(study, model, theta, led_astray(coarse_base.cost, values))?;
     let ties = ties(&screened);
     let place_of = |spot: Spot| screened.iter().position(|s| s.spot == spot).map(|i| ties[i]);
     let mut chosen: Vec<(usize, Sought)> = leaders(&screened, &ties, FITTED)
@@ -679,7 +679,11 @@ impl<'a> Sought<'a> {
                 let instance = drawn::instance(screened.spot, form);
                 let extended = study.extend(model, &instance);
                 let own = &extended.parameters[model.parameters.len()..];
-                let proposed = instance.effect.starts(instance.at(), &study.known(model), &[]);
+                let proposed = instance
+                    .effect
+                    .starts(instance.at(), &study.known(model), &from.peaks_hz);
+                // A resonator is found from near its frequency only.
+                let most = if form == DrawnForm::Resonator { 12 } else { 4 };
                 let alike = from
                     .stiffness
                     .filter(|_| !screened.spot.is_angle())
@@ -694,7 +698,7 @@ impl<'a> Sought<'a> {
                     .into_iter()
                     .chain(alike)
                     .chain([usual])
-                    .chain(proposed.into_iter().take(4))
+                    .chain(proposed.into_iter().take(most))
                     .map(|start| own.iter().zip(start).map(|(p, v)| p.internal_within(v)).collect())
                     .collect();
                 let fits = look(study, &extended, &bases, &starts, effort).ok()?;
@@ -757,6 +761,8 @@ struct Starts {
     theta: Vec<f64>,
     /// Further points: where what is missing may have led `theta` away, the nominal values and what the measured modes say.
     elsewhere: Vec<Vec<f64>>,
+    /// Where the residual is largest, Hz.
+    peaks_hz: Vec<f64>,
     /// What another displacement of the place has, N/m: a bearing is often as stiff one way as the other.
     stiffness: Option<f64>,
 }
@@ -773,15 +779,16 @@ impl Starts {
         }
     }
 
-    fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Self {
-        Starts {
+    fn new(study: &StructureStudy, model: &StructureModel, theta: &[f64], astray: bool) -> Result<Self> {
+        Ok(Starts {
             theta: theta.to_vec(),
+            peaks_hz: study.hints(model, theta)?,
             elsewhere: match astray {
                 true => starts_elsewhere(model, study.measured()),
                 false => Vec::new(),
             },
             stiffness: None,
-        }
+        })
     }
 }
 
@@ -846,6 +853,7 @@ fn second_form(
     let starts = Starts {
         theta: theta.clone(),
         elsewhere: elsewhere.iter().map(|at| [at, own].concat()).collect(),
+        peaks_hz: study.hints(model, theta).unwrap_or_default(),
         stiffness: first_stiffness(first, base_count),
     };
     let looked = promising.iter().take(SECOND[1]).flat_map(|second| {

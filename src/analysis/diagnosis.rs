@@ -27,7 +27,8 @@ pub struct Findings<D: CampaignSide> {
     pub setup: SetupCheck,
     /// The effect that is missing; where none explains the rest, the leading candidate. `None` where nothing is missing.
     pub leading: Option<Leading<D>>,
-    /// Where what the library has no name for sits, and what it does: sought where the verdict is unknown.
+    /// Where what the library has no name for sits, and what it does: sought where the verdict is unknown, and of what the missing effect
+    /// leaves.
     pub lead: Option<D::Lead>,
 }
 
@@ -97,6 +98,11 @@ impl<D: CampaignSide> Findings<D> {
                 now = D::view(&case, &case.model, &diagnosis.baseline.theta)?;
                 lead = None;
             }
+        }
+        if let (None, Some(with)) = (setup.likely(), diagnosis.winner())
+            && diagnosis.companions.is_empty()
+        {
+            lead = D::lead_beyond(&study, with)?;
         }
         let leading = leading_candidate(&diagnosis)
             .map(|number| {

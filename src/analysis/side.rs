@@ -6,7 +6,7 @@ use crate::analysis::workbench::Workbench;
 use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::setup::SetupCheck;
-use crate::discrepancy::{Diagnosis, NextMeasurement};
+use crate::discrepancy::{Diagnosis, EffectCandidate, NextMeasurement};
 use crate::effects::{Instance, Known, Registry};
 use crate::identify::model_history::Side;
 use crate::identify::{Calibration, Case, Model, Modelled, Options, Study};
@@ -82,6 +82,15 @@ pub trait CampaignSide: Modelled {
         _diagnosis: &Diagnosis<Self>,
         _lead: &Self::Lead,
     ) -> Result<Option<(Instance<Self>, Vec<f64>)>> {
+        Ok(None)
+    }
+
+    /// What is known of the rest that the missing effect leaves, `with` that in the model, where it is more than noise and small errors
+    /// of the setup.
+    ///
+    /// # Errors
+    /// A fit that fails.
+    fn lead_beyond(_study: &Self::Study, _with: &EffectCandidate<Self>) -> Result<Option<Self::Lead>> {
         Ok(None)
     }
 

@@ -15,9 +15,10 @@ use crate::discrepancy::localise::named::named;
 use crate::discrepancy::localise::{Localisation, localise};
 use crate::discrepancy::outlook::next_measurement;
 use crate::discrepancy::setup::{SetupCheck, examine};
-use crate::discrepancy::{Diagnosis, Explained, FrfComparison, NextMeasurement};
+use crate::discrepancy::{Diagnosis, EffectCandidate, Explained, FrfComparison, NextMeasurement};
 use crate::effects::{Instance, Known, Registry, Structure};
 use crate::identify::model_history::Side;
+use crate::identify::rest::Rest;
 use crate::identify::{Calibration, Options, StructureCase, StructureModel, StructureStudy};
 
 /// A robot model against the FRFs.
@@ -28,7 +29,7 @@ pub struct FrfView {
     pub comparison: FrfComparison,
 }
 
-/// What is known of a rest that no effect explains.
+/// What is known of a rest that no effect explains, or that the one which is missing leaves.
 pub struct StructureLead {
     /// Where it sits and what it does there, if one place explains more than chance.
     pub place: Option<Localisation>,
@@ -116,6 +117,22 @@ impl CampaignSide for Structure {
             Some(found) => named(study, &case.model, found, &diagnosis.candidates),
             None => Ok(None),
         }
+    }
+
+    fn lead_beyond(
+        study: &StructureStudy,
+        with: &EffectCandidate<Structure>,
+    ) -> Result<Option<StructureLead>> {
+        let is_left = |rest: &Rest| rest.is_significant() && !rest.is_mostly_slips();
+        if !with.rest.as_ref().is_some_and(is_left) {
+            return Ok(None);
+        }
+        let found = localise(study, &with.model.with_start(with.theta.clone()))?;
+        Ok(found.significant.then(|| StructureLead {
+            place: Some(found),
+            links: None,
+            joints: JointTrends::default(),
+        }))
     }
 
     fn next(

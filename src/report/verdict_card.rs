@@ -92,6 +92,13 @@ fn answer<D: Modelled>(
             card.explanation = of.explanation.into();
             card.facts.push(("How big", sizes(&winner.parameters)));
             card.check = Some(of.lab_check.into());
+            if let Some(best) = lead
+                .and_then(|lead| lead.place.as_ref()?.places.first())
+                .and_then(|place| place.best.as_ref())
+            {
+                card.facts
+                    .push(("What it leaves", best.in_words(|_| String::new())));
+            }
             if let Some(excuse) = d.excuse_in_words() {
                 card.explanation += &format!(" {excuse}");
             }

@@ -491,13 +491,15 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
         text += &wrapped(&wrong_links_in_words(found), "  ");
     }
     if let Some(found) = place_drawn(findings) {
-        text += &wrapped(
-            &format!(
-                "A lead: {}. `lobestone localise` draws it.",
-                localise::in_words(found)
+        let drawn = localise::in_words(found);
+        let told = match findings.diagnosis.winner() {
+            Some(missing) => format!(
+                "Of what {0} leaves {drawn}. `lobestone localise` draws it once {0} is in the model.",
+                missing.label()
             ),
-            "  ",
-        );
+            None => format!("A lead: {drawn}. `lobestone localise` draws it."),
+        };
+        text += &wrapped(&told, "  ");
     }
     text
 }

@@ -199,6 +199,8 @@ const LEFT_FAR_MORE: f64 = 1.5;
 const SETTLED: usize = 4;
 /// Lines of all postures together that the screen looks at.
 const SCREENED_LINES: usize = 3000;
+/// Share of the misfit that the leading form leaves at most to be fitted once more as the model itself is.
+const TAKES_MOST: f64 = 0.7;
 /// Forms of a place that are fitted to all data at most.
 const CANDIDATES: usize = 3;
 /// Places within this of the best one's 2 ln L are tied with it.
@@ -375,9 +377,10 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
     };
     let mut settled: Vec<LocalisedPlace> = fitted
         .par_iter()
+        .enumerate()
         .take(SETTLED)
-        .map(|fitted| {
-            let best = settled_form(study, screened[fitted.place].spot, fitted, &without)?;
+        .map(|(number, fitted)| {
+            let best = settled_form(study, screened[fitted.place].spot, fitted, &without, number == 0)?;
             let count = study.data.value_count() as f64;
             let (curve, consistency) = drawn_with(&best, &thinned)?;
             Ok(LocalisedPlace {
@@ -880,7 +883,7 @@ fn second_form(
     let alone = pairs.first().and_then(|pair| {
         let alone = without_the_first(study, bare, pair)?;
         let is_enough = order(&merit(&alone), &merit(&pair.tried)).is_lt();
-        is_enough.then(|| Second::Instead(pair.second, alone))
+        is_enough.then_some(Second::Instead(pair.second, alone))
     });
     let pairs = pairs.into_iter().map(Second::Beside);
     alone.into_iter().chain(pairs).take(SECOND_JUDGED).collect()
@@ -1027,14 +1030,30 @@ struct Without {
 }
 
 /// The best form of a place fitted to all data. One whose size runs to the end of its range there stands for another: then the next.
-fn settled_form(study: &StructureStudy, spot: Spot, fitted: &Fitted, without: &Without) -> Result<BestForm> {
+/// Where the one that `leads` takes most and still leaves more than noise, it may be stuck on its way: fitted as the model itself is.
+fn settled_form(
+    study: &StructureStudy,
+    spot: Spot,
+    fitted: &Fitted,
+    without: &Without,
+    leads: bool,
+) -> Result<BestForm> {
+    let values = study.real_values(Extent::Full) as f64;
     let alone = fitted.forms.iter().map(|tried| (tried, None));
     let pair = fitted.pair.iter().map(|pair| (&pair.tried, Some(pair)));
     let mut first = None;
     for (tried, pair) in pair.chain(alone).take(CANDIDATES) {
         let problem = study.problem(&tried.model, View::FULL);
-        let fit = minimise(&problem, &tried.fit.theta, &tried.model.bounds(), REFINE)?;
+        let bounds = tried.model.bounds();
+        let mut fit = minimise(&problem, &tried.fit.theta, &bounds, REFINE)?;
         if !at_bound(&fit, without.count) {
+            if leads && 2.0 * fit.cost > LEFT_OVER * values && fit.cost < TAKES_MOST * without.cost {
+                let calibration = study.calibrate(&tried.model.with_start(fit.theta.clone()))?;
+                let again = minimise(&problem, &calibration.theta, &bounds, REFINE)?;
+                if again.cost < fit.cost {
+                    fit = again;
+                }
+            }
             return settle(study, spot, (tried, pair), fit, without);
         }
         first.get_or_insert((tried, pair, fit));

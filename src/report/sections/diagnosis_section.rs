@@ -132,11 +132,12 @@ fn what_the_data_draw(findings: &DiagnosisFindings) -> Option<Block> {
     let found = findings.lead.as_ref()?.place.as_ref()?;
     let place = found.places.first()?;
     let drawing = DrawnCurveFigure::of(place);
-    let with = findings.diagnosis.winner().map_or(String::new(), |missing| {
-        format!("With {} in the model: ", missing.label())
-    });
+    let begin = findings.diagnosis.winner().map_or_else(
+        || "What".to_string(),
+        |missing| format!("With {} in the model, what", missing.label()),
+    );
     let caption = format!(
-        "{with}What a part of its own that acts {} would have to be, line by line, for the model to agree with the FRFs, and the simple \
+        "{begin} a part of its own that acts {} would have to be, line by line, for the model to agree with the FRFs, and the simple \
          form that comes nearest. A spring is level in the real part, a damper rises in the imaginary part, a mass falls in the real \
          part, a resonator has a peak. It leaves {:.2} times the variance of the noise.",
         place.spot.words(),

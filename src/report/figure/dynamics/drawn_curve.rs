@@ -26,6 +26,8 @@ pub struct DrawnCurveFigure {
     pub form_label: String,
 }
 
+/// Share of the lines, the surest, that must be seen.
+const SURE: f64 = 0.2;
 const PALE: Color = Color(198, 216, 232);
 
 /// Name of a part of a complex stiffness, and how to take it.
@@ -70,13 +72,13 @@ impl DrawnCurveFigure {
         self.std[line] / std::f64::consts::SQRT_2
     }
 
-    /// Least and largest value of a part that must be seen. Lines that say little must not press the others flat: those with the
-    /// smaller half of the errors set the scale.
+    /// Least and largest value of a part that must be seen. Lines that say little must not press the others flat: those that
+    /// say most, and the form, set the scale.
     pub(crate) fn range(&self, part: fn(Complex64) -> f64) -> (f64, f64) {
         let lines = self.lines();
-        let middle =
-            quantile(lines.iter().map(|k| self.std[*k]).filter(|s| usable(*s)), 0.5).unwrap_or(f64::INFINITY);
-        let sure = lines.iter().filter(|k| self.std[**k] <= middle);
+        let stds = lines.iter().map(|k| self.std[*k]).filter(|s| usable(*s));
+        let most = quantile(stds, SURE).unwrap_or(f64::INFINITY);
+        let sure = lines.iter().filter(|k| self.std[**k] <= most);
         let values = sure
             .map(|k| part(self.stiffness[*k]))
             .chain(self.form.iter().map(|z| part(*z)))
@@ -139,5 +141,31 @@ impl DrawnCurveFigure {
                 panel.frame(canvas);
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A faint spring that a fifth of the lines know to a tenth of it and the others to a thousand times of it.
+    #[test]
+    fn lines_that_say_little_do_not_press_the_law_flat() {
+        let sure = |k: usize| k < 20;
+        let figure = DrawnCurveFigure {
+            frequency_hz: (1..=100).map(|k| k as f64).collect(),
+            stiffness: (0..100)
+                .map(|k| {
+                    let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                    let off = if sure(k) { 1e3 } else { 1e7 };
+                    Complex64::new(1e4 + sign * off, sign * off)
+                })
+                .collect(),
+            std: (0..100).map(|k| if sure(k) { 1e3 } else { 1e7 }).collect(),
+            form: vec![Complex64::new(1e4, 0.0); 100],
+            ..DrawnCurveFigure::default()
+        };
+        assert_eq!(figure.range(|z| z.re), (0.0, 1.1e4));
+        assert_eq!(figure.range(|z| z.im), (-1e3, 1e3));
     }
 }

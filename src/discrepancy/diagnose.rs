@@ -16,8 +16,8 @@ use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise
 use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_from, from_possible_size, held_out,
-    own_starts, rescue, try_again, try_effect, try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, from_possible_size,
+    held_out, own_starts, rescue, try_again, try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -622,12 +622,6 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(refined)
     }
 
-    /// From the starting points that the model itself is fitted from, and from `theta`.
-    fn fitted_as_the_model(&self, model: &ModelOf<S>, theta: &[f64]) -> Result<Fit> {
-        let calibration = self.study.calibrate(&model.with_start(theta.to_vec()))?;
-        self.minimise(model, View::FULL, &calibration.theta, REFINE)
-    }
-
     /// What explains most and leaves more than noise may be stuck away from its best fit, or be another choice of the same effect.
     fn try_harder(&self, best: &mut TriedOf<S>, base_reduced: f64) -> Result<()> {
         let is_noise = |t: &TriedOf<S>| verdict::is_noise(self.reduced_chi2(t));
@@ -638,7 +632,7 @@ impl<'a, S: Study> Engine<'a, S> {
             best.fit = fit;
         }
         if !is_noise(best) && share_taken(base_reduced, self.reduced_chi2(best)) > PAIR_SHARE {
-            let fit = self.fitted_as_the_model(&best.model, &best.fit.theta)?;
+            let fit = fit_as_a_model(self.study, &best.model, &best.fit.theta, REFINE)?;
             if fit.cost < best.fit.cost {
                 best.fit = fit;
             }
@@ -904,7 +898,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter(|three| evidence.base_chi2 - 2.0 * three.cost > NEARLY_ALL * above)
             .filter(|three| self.looks_affordable(&three.model) >= FEWEST_PAIRS)
         {
-            let fit = self.fitted_as_the_model(&three.model, &three.theta)?;
+            let fit = fit_as_a_model(self.study, &three.model, &three.theta, REFINE)?;
             let fresh = self.together(three.parts.clone(), three.model.clone(), fit)?;
             self.keep_better(&mut best, &fresh, (candidates, leading), evidence)?;
         }

@@ -25,6 +25,6 @@ pub(crate) use possible::NEGLIGIBLE;
 pub use possible::Size;
 pub use registry::{CUTTING, Registry, STRUCTURAL};
 pub use request::requested;
-pub use site::{At, EffectName, Site};
+pub use site::{At, EffectName, Site, WrittenEffect};
 pub use spot::Spot;
 pub use structural::{ChannelFilter, Conditions, DataSummary, LINK_FLEXIBILITY, PostureSetting, Structure};

@@ -20,7 +20,7 @@ use super::cutting::teeth::uneven_pitch::UnevenPitch;
 use super::cutting::tool_wear::ToolWear;
 use super::drawn::{DrawnBranch, Series};
 use super::effect::{Domain, Effect, Instance};
-use super::site::Site;
+use super::site::{Site, WrittenEffect};
 use super::structural::Structure;
 use super::structural::amplitude_dependent_stiffness::AmplitudeDependentStiffness;
 use super::structural::base_compliance::BaseCompliance;
@@ -162,7 +162,7 @@ impl<D: Domain> Registry<D> {
 
     /// The effect that `EFFECT[@SITE][:choice=value]` begins with.
     pub fn effect_of(&self, request: &str) -> Option<&'static dyn Effect<D>> {
-        self.effect(request.split(['@', ':']).next()?)
+        self.effect(WrittenEffect::of(request).id)
     }
 
     /// Every instance that a diagnosis tries on this object, discrete choices included.

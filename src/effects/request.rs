@@ -2,7 +2,7 @@
 
 use super::effect::{Domain, Effect, Instance, Known};
 use super::registry::Registry;
-use super::site::Site;
+use super::site::{Site, WrittenEffect};
 use crate::text::{closest, shown_briefly};
 use crate::{InputError, Result};
 
@@ -18,14 +18,12 @@ pub fn requested<D: Domain>(
     name: &str,
 ) -> Result<Vec<Instance<D>>> {
     let wrong = |problem: String, remedy: String| InputError::new(problem).key("EFFECT").remedy(remedy);
-    let (name, choice) = match name.split_once(':') {
-        Some((name, choice)) => (name, Some(choice)),
-        None => (name, None),
-    };
-    let (id, site) = match name.split_once('@') {
-        Some((id, site)) => (id, Some(site)),
-        None => (name, None),
-    };
+    let WrittenEffect {
+        label: name,
+        id,
+        site,
+        values: choice,
+    } = WrittenEffect::of(name);
     let Some(effect) = registry.effect(id) else {
         let ids: Vec<&str> = registry.tried().iter().map(|e| e.id()).collect();
         let near =

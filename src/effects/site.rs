@@ -47,6 +47,37 @@ impl At {
     };
 }
 
+/// `EFFECT[@SITE][:key=value,…]` as a person writes it, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WrittenEffect<'a> {
+    /// All before the colon: what the effect at its site is called.
+    pub label: &'a str,
+    /// Its id.
+    pub id: &'a str,
+    /// Where it sits, if that is said.
+    pub site: Option<&'a str>,
+    /// What stands behind the colon.
+    pub values: Option<&'a str>,
+}
+
+impl<'a> WrittenEffect<'a> {
+    /// The parts of `text`, whatever they mean.
+    pub fn of(text: &'a str) -> Self {
+        let apart = |text: &'a str, mark| {
+            text.split_once(mark)
+                .map_or((text, None), |(front, rest)| (front, Some(rest)))
+        };
+        let (label, values) = apart(text, ':');
+        let (id, site) = apart(label, '@');
+        WrittenEffect {
+            label,
+            id,
+            site,
+            values,
+        }
+    }
+}
+
 /// How an effect at a site is called.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct EffectName {

@@ -489,6 +489,26 @@ pub struct Tried<D: Modelled> {
     pub fit: Fit,
 }
 
+/// `model` fitted to all data from the starting points that a model without effects added is fitted from, and from `theta` (solver's
+/// scale).
+///
+/// # Errors
+/// A model that cannot be calibrated to the data.
+pub fn fit_as_a_model<S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    theta: &[f64],
+    stopping: Stopping,
+) -> Result<Fit> {
+    let calibration = study.calibrate(&model.with_start(theta.to_vec()))?;
+    minimise(
+        &study.problem(model, View::FULL),
+        &calibration.theta,
+        &model.bounds(),
+        stopping,
+    )
+}
+
 /// `model` with `instance`, fitted to a view from one point (solver's scale).
 ///
 /// # Errors

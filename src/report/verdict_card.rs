@@ -10,7 +10,7 @@ use crate::analysis::{CuttingFindings, DiagnosisFindings, StructureFindings, Str
 use crate::campaign::{Campaign, Process};
 use crate::cutting::CfcResult;
 use crate::discrepancy::candidate::BaselineFit;
-use crate::discrepancy::localise::Localisation;
+use crate::discrepancy::localise::{BestForm, Localisation};
 use crate::discrepancy::setup::SetupFinding;
 use crate::discrepancy::verdict::is_noise;
 use crate::discrepancy::{CutError, Diagnosis, DiagnosisVerdict};
@@ -70,6 +70,16 @@ pub fn departure(p: &Estimate) -> String {
     let fitted = plus_minus(p.value, p.std_error, p.unit);
     let name = words::parameter_of(&p.name);
     format!("{name} {fitted} instead of {}", format_si(p.initial, p.unit, 4))
+}
+
+/// The commands that put what is drawn into the model of the campaign in `dir`, a word of a shell.
+pub fn to_add(best: &BestForm, dir: &str) -> String {
+    let commands: Vec<String> = best
+        .requests()
+        .iter()
+        .map(|request| format!("`lobestone add {dir} {request}`"))
+        .collect();
+    commands.join(", then ")
 }
 
 /// Headline, explanation, facts and check of a verdict.
@@ -351,17 +361,10 @@ pub fn structure(
                         place: Some(lead), ..
                     }),
                 ) => match lead.places.first().and_then(|p| p.best.as_ref()) {
-                    Some(best) => {
-                        let requests = best.requests();
-                        let commands: Vec<String> = requests
-                            .iter()
-                            .map(|r| format!("`lobestone add {dir} {r}`"))
-                            .collect();
-                        format!(
-                            "look at what the data draw: `lobestone localise {dir}`; to put it into the model: {}",
-                            commands.join(", then ")
-                        )
-                    }
+                    Some(best) => format!(
+                        "look at what the data draw: `lobestone localise {dir}`; to put it into the model: {}",
+                        to_add(best, &dir)
+                    ),
                     None => format!("{}", found.next_measurement),
                 },
                 _ => format!("{}", found.next_measurement),

@@ -5,7 +5,9 @@ use serde_json::{Map, Value, json};
 use super::draw::Draws;
 use super::foreign;
 use crate::data::RobotSpec;
-use crate::effects::{DataSummary, Domain, Instance, Known, Registry, STRUCTURAL, Size, Structure};
+use crate::effects::{
+    DataSummary, Domain, Instance, Known, Registry, STRUCTURAL, Size, Structure, WrittenEffect,
+};
 use crate::parameter::Parameter;
 use crate::simulate::sizes::magnitude;
 use crate::text::closest;
@@ -26,10 +28,9 @@ impl std::str::FromStr for EffectRequest {
     type Err = InputError;
 
     fn from_str(text: &str) -> std::result::Result<Self, InputError> {
-        let (name, list) = text.split_once(':').map_or((text, None), |(n, l)| (n, Some(l)));
-        let (effect, site) = name.split_once('@').map_or((name, None), |(e, s)| (e, Some(s)));
+        let written = WrittenEffect::of(text);
         let mut values = Vec::new();
-        for item in list.into_iter().flat_map(|l| l.split(',')) {
+        for item in written.values.into_iter().flat_map(|l| l.split(',')) {
             let Some((key, value)) = item.split_once('=') else {
                 return Err(InputError::new(format!("{item:?} is not parameter=value"))
                     .key(text)
@@ -38,8 +39,8 @@ impl std::str::FromStr for EffectRequest {
             values.push((key.trim().to_string(), value.trim().to_string()));
         }
         Ok(EffectRequest {
-            effect: effect.trim().to_string(),
-            site: site.map(|s| s.trim().to_string()),
+            effect: written.id.trim().to_string(),
+            site: written.site.map(|s| s.trim().to_string()),
             values,
         })
     }

@@ -10,7 +10,7 @@ use crate::discrepancy::localise::{BestForm, DrawnPart, Localisation, LocalisedP
 use crate::identify::frfs::calibrate::Estimate;
 use crate::identify::{HeldOut, Options, StructureCase};
 use crate::report::figure::DrawnCurveFigure;
-use crate::report::verdict_card::size;
+use crate::report::verdict_card::{size, to_add};
 use crate::revision::Side;
 use crate::text::shell_word;
 
@@ -37,12 +37,7 @@ pub fn run(args: LocaliseArgs) -> Result<Outcome> {
     let best = found.places.first();
     let next = match best.and_then(|p| p.best.as_ref()) {
         Some(form) if found.significant => {
-            let commands: Vec<String> = form
-                .requests()
-                .iter()
-                .map(|r| format!("`lobestone add {dir} {r}`"))
-                .collect();
-            format!("run {} to put it into the model", commands.join(", then "))
+            format!("run {} to put it into the model", to_add(form, &dir))
         }
         _ => format!("nothing to add here; `lobestone compare {dir}` shows where the model fails"),
     };
@@ -183,11 +178,11 @@ struct SecondDrawn<'a> {
 
 impl<'a> SecondDrawn<'a> {
     fn of(best: &'a BestForm) -> Option<Self> {
-        let second = best.second.as_ref()?;
+        let (second, add) = (best.second.as_ref()?, best.requests().pop()?);
         let (parameters, errors) = by_name(&second.parameters);
         Some(SecondDrawn {
             place: second.spot.label(),
-            add: second.instance.request(),
+            add,
             form: second.form().label(),
             parameters,
             errors,

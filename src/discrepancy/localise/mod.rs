@@ -25,7 +25,8 @@ use crate::identify::frfs::spot_response::{SpotResponses, free_spots};
 use crate::identify::frfs::structure_study::{led_astray, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Looked, OUT_OF_RACE, Study, Tried, View, fit_from, held_out, look, race,
+    Effort, Extent, HeldOut, Looked, OUT_OF_RACE, Study, Tried, View, fit_as_a_model, fit_from, held_out,
+    look, race,
 };
 use crate::identify::{StructureModel, StructureStudy};
 use screen::{CurvePoint, Screened};
@@ -1044,12 +1045,10 @@ fn settled_form(
     let mut first = None;
     for (tried, pair) in pair.chain(alone).take(CANDIDATES) {
         let problem = study.problem(&tried.model, View::FULL);
-        let bounds = tried.model.bounds();
-        let mut fit = minimise(&problem, &tried.fit.theta, &bounds, REFINE)?;
+        let mut fit = minimise(&problem, &tried.fit.theta, &tried.model.bounds(), REFINE)?;
         if !at_bound(&fit, without.count) {
             if leads && 2.0 * fit.cost > LEFT_OVER * values && fit.cost < TAKES_MOST * without.cost {
-                let calibration = study.calibrate(&tried.model.with_start(fit.theta.clone()))?;
-                let again = minimise(&problem, &calibration.theta, &bounds, REFINE)?;
+                let again = fit_as_a_model(study, &tried.model, &fit.theta, REFINE)?;
                 if again.cost < fit.cost {
                     fit = again;
                 }

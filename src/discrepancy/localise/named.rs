@@ -7,7 +7,7 @@ use crate::Result;
 use crate::discrepancy::candidate::EffectCandidate;
 use crate::effects::{Instance, Structure};
 use crate::identify::levenberg_marquardt::Stopping;
-use crate::identify::study::{Extent, Study, View, own_starts};
+use crate::identify::study::{Extent, Study, View, fit_from, own_starts};
 use crate::identify::{LeastSquares, StructureModel, StructureStudy, minimise};
 
 /// Share of what the drawn form takes away that an effect must take away in a few steps to be worth another diagnosis.
@@ -69,13 +69,7 @@ pub fn named(
     let Some(known) = tried.iter().find(|known| known.label() == instance.label()) else {
         return Ok(Some((instance, theta)));
     };
-    let extended = study.extend(model, &instance);
-    let fit = minimise(
-        &study.problem(&extended, View::FULL),
-        &theta,
-        &extended.bounds(),
-        REFINE,
-    )?;
+    let fit = fit_from(study, model, &instance, &theta, View::FULL, REFINE)?.fit;
     let freedom = study.real_values(Extent::Full) as f64 - fit.theta.len() as f64;
     let is_news = 2.0 * fit.cost < (1.0 - NEWS) * known.reduced_chi2 * freedom;
     Ok(is_news.then_some((instance, fit.theta)))

@@ -432,6 +432,25 @@ fn the_data_draw_what_hides_behind_the_rest() {
     assert!((of_truth - 1.0).abs() < 0.05, "{of_truth}");
 }
 
+/// What a named effect leaves is drawn beside it; each of two parts that are drawn is added by the form that it was drawn with.
+#[test]
+fn what_an_effect_leaves_is_drawn_and_two_parts_are_added_one_after_the_other() {
+    let hose = ["--unknown", "hose-to-ground", "--share", "0.02"];
+    let cell = Simulated::new(&[&["--effect", "tool-flexibility", "--seed", "78"][..], &hose].concat());
+    let found = document(&["diagnose", cell.path()]);
+    assert_eq!(found["effect"], "tool-flexibility", "{found}");
+    assert_eq!(found["lead"]["place"], "link-3-ground.z", "{found}");
+    let cell = Simulated::new(&["--unknown", "two-resonators", "--seed", "1003"]);
+    let found = document(&["localise", cell.path()]);
+    let place = &found["places"][0];
+    for part in [place, &place["second"]] {
+        let request = part["add"].as_str().unwrap();
+        assert!(request.ends_with(":form=resonator"), "{request}");
+        let added = document(&["add", cell.path(), request]);
+        assert_eq!(added["progress"], true, "{added}");
+    }
+}
+
 /// Physics outside the library, as faint as asked for, named in the truth and nowhere in the folder.
 #[test]
 fn a_departure_is_as_faint_as_asked_for() {

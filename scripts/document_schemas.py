@@ -35,7 +35,7 @@ UNSEEN = {
         {"type": "array", "items": {"type": "string"}},
     ),
     **dict.fromkeys(["not_converged_because", "best_guess", "companion", "looks_like", "too_little_data", "site", "cut_list", "next_step",
-                     "beside"], TEXT),
+                     "beside", "lead_beside"], TEXT),
     **dict.fromkeys(["share", "small_errors_share", "std_error", "std_error_bootstrap", "time_constant_s", "last_sigmas", "change_sigmas",
                      "reciprocity_nrms", "elbow_deg", "frequency_scatter"], NUMBER),
     "revision": {"type": ["integer", "null"]},

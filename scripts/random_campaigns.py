@@ -2,13 +2,15 @@
 """Tries `lobestone diagnose` on simulated campaigns of which everything was drawn.
 
     random_campaigns.py [--tier mixed] [--count 50] [--first-seed 1000] [--lobestone target/release/lobestone]
-                        [--loops] [--lines-hz HZ] [--report reports/diagnosis_TIER.md] [--keep DIR] [--effect EFFECT ...]
+                        [--loops] [--lines-hz HZ] [--report reports/diagnosis_TIER.md] [--keep DIR]
+                        [--effect EFFECT ...] [--drawn-sigmas]
 
 Campaign by campaign: `lobestone simulate --random TIER --seed S`, `lobestone diagnose --json`, verdict against truth. Tiers
 are those of `lobestone simulate --help`: controls, faint effects, foreign physics, the mixture that the confidence is
-tried on (`trial`), the laboratory, three effects at once. `--effect` hides the effects named in turn, at their usual sizes, in
-campaigns of all kinds instead (force records where the first is one on cutting forces). `--loops` goes on with `add` until nothing is found. Writes a report (confusion matrix, false alarms, misses by how plainly the effect shows, calibration of the
-confidence, time), next to it a CSV with one row a campaign and, where matplotlib is there, the reliability diagram. A CSV
+tried on (`trial`), the laboratory, three effects at once. `--effect` hides the effects named in turn in campaigns of all
+kinds instead (force records where the first is one on cutting forces), at their usual sizes or, with `--drawn-sigmas`, from
+barely visible to plain. `--loops` goes on with `add` until nothing is found. Writes a report (confusion matrix, false alarms,
+misses by how plainly the effect shows, calibration of the confidence, time), next to it a CSV with one row a campaign and, where matplotlib is there, the reliability diagram. A CSV
 that is there already is continued: campaigns in it are not run again, so a long run may be stopped and goes on.
 """
 
@@ -17,6 +19,7 @@ import csv
 import json
 import math
 import pathlib
+import random
 import resource
 import statistics
 import subprocess
@@ -37,6 +40,8 @@ KINDS = ["careful", "direct", "dirty"]
 BINS = [0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0001]
 # An effect that sticks out of the noise less than this may honestly be called absent.
 VISIBLE_SIGMAS = 10
+# Between which it is drawn how plainly an effect shows, standard deviations: as `simulate --random mixed` does.
+VISIBILITY_SIGMAS = (5.0, 1000.0)
 # A library effect that leaves no more than this share of what foreign physics does is as good a name as `unknown`.
 EQUIVALENT_SHARE = 0.1
 # Effects that a loop may add.
@@ -52,6 +57,8 @@ def main():
     arguments.add_argument("--simulate-with", help="another lobestone that makes the campaigns, to try an older one on them")
     arguments.add_argument("--loops", action="store_true", help="diagnose, add what is named, and so on until nothing is")
     arguments.add_argument("--effect", action="append", default=[], help="hide this effect of the library instead (several: in turn)")
+    arguments.add_argument("--drawn-sigmas", action="store_true", help="of such an effect draw how plainly it shows, as `mixed` does "
+                           "(else: its usual sizes, which in some campaigns are not seen at all)")
     arguments.add_argument("--lines-hz", type=float, help="spacing of the spectral lines, to try this script quickly (default: as "
                            "simulate has it)")
     arguments.add_argument("--report", type=pathlib.Path, help="default: reports/diagnosis_TIER.md")
@@ -126,6 +133,9 @@ def simulated(options, seed, folder):
         turn = seed - options.first_seed
         effect = options.effect[turn % len(options.effect)]
         what = ["--effect", effect, "--kind", KINDS[turn // len(options.effect) % len(KINDS)]]
+        if options.drawn_sigmas:
+            draw = random.Random(f"sigmas {seed}")
+            what += ["--visibility", f"{math.exp(draw.uniform(*map(math.log, VISIBILITY_SIGMAS))):.3g}"]
         if effect.startswith("amplitude"):
             what += ["--force-levels", "200,50"]
     written = lobestone(options.simulate_with or options.lobestone, "simulate", "--out", name, "--seed", str(seed), *spacing, *what)

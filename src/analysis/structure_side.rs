@@ -21,6 +21,9 @@ use crate::identify::model_history::Side;
 use crate::identify::rest::Rest;
 use crate::identify::{Calibration, Options, StructureCase, StructureModel, StructureStudy};
 
+/// Share of what stands above the noise from which on an effect that is not all of it has a name for most of it.
+const NAMES_MOST: f64 = 0.8;
+
 /// A robot model against the FRFs.
 pub struct FrfView {
     /// Predictions in the order of `case.data.frfs()`, m/N.
@@ -33,10 +36,19 @@ pub struct FrfView {
 pub struct StructureLead {
     /// Where it sits and what it does there, if one place explains more than chance.
     pub place: Option<Localisation>,
+    /// The effect that was in the model while that was drawn.
+    pub beside: Option<String>,
     /// Numbers of the robot file that explain it.
     pub links: Option<WrongLinks>,
     /// Joint stiffness and damping as each posture alone wants them, and what they follow.
     pub joints: JointTrends,
+}
+
+impl StructureLead {
+    /// Misfit per complex value that the best place leaves: 1 is noise.
+    fn left(&self) -> Option<f64> {
+        Some(self.place.as_ref()?.places.first()?.left)
+    }
 }
 
 impl CampaignSide for Structure {
@@ -99,12 +111,22 @@ impl CampaignSide for Structure {
         diagnosis: &Diagnosis<Structure>,
         _now: &FrfView,
     ) -> Result<Option<StructureLead>> {
-        let found = StructureLead {
-            place: Some(localise(study, &case.model)?).filter(|found| found.significant),
+        let place = Some(localise(study, &case.model)?).filter(|found| found.significant);
+        let mut lead = StructureLead {
+            place,
+            beside: None,
             links: WrongLinks::seek(campaign, case, study, diagnosis)?,
             joints: joint_trends(study, &case.model, &diagnosis.baseline.theta, &campaign.postures)?,
         };
-        Ok(Some(found))
+        // Where an effect has a name for most of it already, the rest is what has to be drawn.
+        if let Some(guess) = diagnosis.best_guess.map(|number| &diagnosis.candidates[number])
+            && guess.share_above_noise(&diagnosis.baseline) >= NAMES_MOST
+            && lead.left().is_none_or(|left| guess.reduced_chi2 < left)
+            && let Some(beyond) = Self::lead_beyond(study, guess)?
+        {
+            (lead.place, lead.beside) = (beyond.place, beyond.beside);
+        }
+        Ok(Some(lead))
     }
 
     fn named(
@@ -113,9 +135,13 @@ impl CampaignSide for Structure {
         diagnosis: &Diagnosis<Structure>,
         lead: &StructureLead,
     ) -> Result<Option<(Instance<Structure>, Vec<f64>)>> {
-        match &lead.place {
-            Some(found) => named(study, &case.model, found, &diagnosis.candidates),
-            None => Ok(None),
+        match lead {
+            StructureLead {
+                place: Some(found),
+                beside: None,
+                ..
+            } => named(study, &case.model, found, &diagnosis.candidates),
+            _ => Ok(None),
         }
     }
 
@@ -130,6 +156,7 @@ impl CampaignSide for Structure {
         let found = localise(study, &with.model.with_start(with.theta.clone()))?;
         Ok(found.significant.then(|| StructureLead {
             place: Some(found),
+            beside: Some(with.label()),
             links: None,
             joints: JointTrends::default(),
         }))

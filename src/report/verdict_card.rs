@@ -122,7 +122,7 @@ fn answer<D: Modelled>(
             card.explanation = sentence(d.too_little_data.as_deref().unwrap_or_default());
         }
         _ => {
-            unknown(&mut card, d, lead.and_then(|l| l.place.as_ref()));
+            unknown(&mut card, d, lead, label_in_words);
             if let Some(links) = lead.and_then(|l| l.links.as_ref()) {
                 robot_file_first(&mut card, links);
             }
@@ -194,7 +194,14 @@ fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], dat
     }
 }
 
-fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&Localisation>) {
+fn unknown<D: Modelled>(
+    card: &mut VerdictCard,
+    d: &Diagnosis<D>,
+    lead: Option<&StructureLead>,
+    label_in_words: impl Fn(&String) -> String,
+) {
+    let beside = lead.and_then(|lead| lead.beside.as_ref()).map(label_in_words);
+    let lead = lead.and_then(|lead| lead.place.as_ref());
     let drawn = lead.and_then(|found| {
         let place = found.places.first()?;
         Some((place, place.best.as_ref()?))
@@ -207,10 +214,15 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
     card.explanation = "What is left is real, but no effect that this program knows explains it.".into();
     card.headline = match drawn {
         Some((place, best)) => {
-            card.explanation += &format!(
-                " Without a name for it, the data still draw what it does and where: {}.",
-                best.in_words(|_| String::new())
-            );
+            let what = best.in_words(|_| String::new());
+            card.explanation += &match &beside {
+                Some(guess) => format!(
+                    " The best guess ({guess}) comes near; of what that leaves the data draw what it does and where: {what}."
+                ),
+                None => {
+                    format!(" Without a name for it, the data still draw what it does and where: {what}.")
+                }
+            };
             let all: Vec<Estimate> = best.parts().flat_map(|p| p.parameters.clone()).collect();
             card.facts.push(("How big", sizes(&all)));
             if !place.tied_with.is_empty() {
@@ -224,7 +236,10 @@ fn unknown<D: Modelled>(card: &mut VerdictCard, d: &Diagnosis<D>, lead: Option<&
                     );
                     "Something is missing that has no name here".into()
                 }
-                None => format!("Something unknown {}", place.in_words()),
+                None => {
+                    let beside = beside.map_or(String::new(), |guess| format!(", beside: {guess}"));
+                    format!("Something unknown {}{beside}", place.in_words())
+                }
             }
         }
         None => "Something is missing that has no name here".into(),
@@ -358,14 +373,21 @@ pub fn structure(
                     _,
                     _,
                     Some(StructureLead {
-                        place: Some(lead), ..
+                        place: Some(lead),
+                        beside,
+                        ..
                     }),
-                ) => match lead.places.first().and_then(|p| p.best.as_ref()) {
-                    Some(best) => format!(
+                ) => match (lead.places.first().and_then(|p| p.best.as_ref()), beside) {
+                    (Some(best), Some(guess)) => format!(
+                        "put the best guess into the model: `lobestone add {dir} {guess}`; then look at what the data draw of the rest: \
+                         `lobestone localise {dir}`; to put that in as well: {}",
+                        to_add(best, &dir)
+                    ),
+                    (Some(best), None) => format!(
                         "look at what the data draw: `lobestone localise {dir}`; to put it into the model: {}",
                         to_add(best, &dir)
                     ),
-                    None => format!("{}", found.next_measurement),
+                    (None, _) => format!("{}", found.next_measurement),
                 },
                 _ => format!("{}", found.next_measurement),
             };

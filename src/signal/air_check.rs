@@ -33,7 +33,8 @@ const MOST_TURNS: usize = 60;
 /// What comes back one turn later (covariance of neighbouring turns, each less its mean and the drift of all), and all
 /// fluctuation within turns; both summed over the channels. `None` with less than two turns.
 pub(super) fn content<S: Sample>(channels: &[&[S]], range: &Range<usize>, turn: f64) -> Option<(f64, f64)> {
-    let turns = (range.len() as f64 / turn + 1e-6).floor() as usize;
+    // Ranges are rounded to samples.
+    let turns = ((range.len() as f64 + 0.5) / turn).floor() as usize;
     let length = turn.floor() as usize;
     if turns < 2 || length < 2 {
         return None;

@@ -54,8 +54,8 @@ const STRETCHES_S: [f64; 3] = [0.4, 1.6, 0.4];
 /// Angles of the tool at which a turn is counted, and the share of half the sampling rate that the amplifier passes.
 const ANGLES: usize = 2880;
 const PASSED: f64 = 0.9;
-/// Slices of the depth.
-const SLICES: usize = 40;
+/// Slices of the depth: their stairs put a line at order 30 off by 5e-4 of itself where the helix is steep.
+const SLICES: usize = 100;
 
 /// The tool and what is cut.
 struct Lab {

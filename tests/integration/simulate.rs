@@ -440,6 +440,21 @@ fn what_an_effect_leaves_is_drawn_and_two_parts_are_added_one_after_the_other() 
     let found = document(&["diagnose", cell.path()]);
     assert_eq!(found["effect"], "tool-flexibility", "{found}");
     assert_eq!(found["lead"]["place"], "link-3-ground.z", "{found}");
+    assert_eq!(found["lead_beside"], "tool-flexibility", "{found}");
+    // Where the best guess is not all of it, what it leaves is drawn, not what it already explains.
+    let hose = [
+        "--unknown",
+        "hose-to-ground",
+        "--share",
+        "0.05",
+        "--points",
+        "tool",
+    ];
+    let cell = Simulated::new(&[&["--effect", "payload", "--seed", "77"][..], &hose].concat());
+    let found = document(&["diagnose", cell.path()]);
+    assert_eq!(found["best_guess"], "payload", "{found}");
+    assert_eq!(found["lead_beside"], "payload", "{found}");
+    assert_eq!(found["lead"]["place"], "link-5-ground.y", "{found}");
     let cell = Simulated::new(&["--unknown", "two-resonators", "--seed", "1003"]);
     let found = document(&["localise", cell.path()]);
     let place = &found["places"][0];

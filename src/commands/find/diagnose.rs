@@ -66,6 +66,7 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         lead: place_drawn(findings)
             .and_then(|found| found.places.first())
             .map(PlaceDrawn::of),
+        lead_beside: findings.lead.as_ref().and_then(|lead| lead.beside.as_deref()),
         wrong_links: wrong_links(findings),
         joint_trends: joints.map_or(&[], |j| &j.trends),
         joint_courses: joints.map_or(&[], |j| &j.courses),
@@ -227,6 +228,8 @@ struct StructureKeys<'a> {
     residual_peaks_hz: Vec<f64>,
     residual_peaks: &'a [ResidualPeak],
     lead: Option<PlaceDrawn<'a>>,
+    /// The effect that is in the model there.
+    lead_beside: Option<&'a str>,
     wrong_links: Option<&'a WrongLinks>,
     joint_trends: &'a [JointTrend],
     joint_courses: &'a [JointCourse],
@@ -492,10 +495,9 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
     }
     if let Some(found) = place_drawn(findings) {
         let drawn = localise::in_words(found);
-        let told = match findings.diagnosis.winner() {
-            Some(missing) => format!(
-                "Of what {0} leaves {drawn}. `lobestone localise` draws it once {0} is in the model.",
-                missing.label()
+        let told = match findings.lead.as_ref().and_then(|lead| lead.beside.as_ref()) {
+            Some(beside) => format!(
+                "Of what {beside} leaves {drawn}. `lobestone localise` draws it once {beside} is in the model."
             ),
             None => format!("A lead: {drawn}. `lobestone localise` draws it."),
         };

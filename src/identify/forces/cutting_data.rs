@@ -17,7 +17,7 @@ use crate::identify::forces::asynchronous_lines::{
 };
 use crate::identify::forces::cutting_windows::Windows;
 pub use crate::identify::forces::force_channel::ForceChannel;
-use crate::identify::forces::force_channel::{force_channel, sample_std, widen_for_vibration};
+use crate::identify::forces::force_channel::{force_channel, widen_for_vibration};
 use crate::signal::{MAINS_HZ, SpindleTrack, highest_order_seen_whole, line_amplitude, order_spectrum_above};
 use crate::{Error, InputError, Result};
 
@@ -160,11 +160,6 @@ impl CutData {
                     *std = std.hypot(track.lost_of_line(order) * line.norm());
                 }
             }
-            let air_std = window
-                .air()
-                .map(|r| sample_std(&values[r]))
-                .filter(|s| *s > 0.0)
-                .fold(0.0, f64::max);
             let quiet = window.air().max_by_key(|r| r.len());
             let hum: Vec<(f64, f64)> = MAINS_HZ
                 .iter()
@@ -183,7 +178,6 @@ impl CutData {
                 rate,
                 &window,
                 &spectrum,
-                air_std,
                 &hum,
                 cut.spindle_rpm / 60.0,
             );

@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use crate::data::Sample;
 use crate::identify::forces::asynchronous_lines::AsynchronousLines;
 use crate::identify::forces::cutting_windows::Windows;
-use crate::signal::{OrderSpectrum, mean_between};
+use crate::signal::{OrderSpectrum, mean_between, noise_of_means};
 
 /// One recorded channel of one cut.
 #[derive(Debug, Clone)]
@@ -44,7 +44,7 @@ impl ForceChannel {
 }
 
 /// White noise of a stretch of air: differences of neighbouring samples know no drift and little hum.
-pub(crate) fn sample_std<S: Sample>(samples: &[S]) -> f64 {
+fn sample_std<S: Sample>(samples: &[S]) -> f64 {
     let squares: f64 = samples
         .windows(2)
         .map(|w| (w[1].value() - w[0].value()).powi(2))
@@ -59,7 +59,6 @@ pub(crate) fn force_channel<S: Sample>(
     rate: f64,
     window: &Windows,
     spectrum: &OrderSpectrum,
-    air_std: f64,
     hum: &[(f64, f64)],
     spindle_hz: f64,
 ) -> Option<ForceChannel> {
@@ -70,11 +69,22 @@ pub(crate) fn force_channel<S: Sample>(
         let sinc = if x.abs() < 1e-6 { 1.0 } else { x.sin() / x };
         0.5 * (amplitude * sinc).powi(2)
     };
+    // Blocks of a kind are of one length.
+    let block_s = |is_cut: bool| {
+        let mut blocks = window.blocks.iter().enumerate();
+        let first = blocks.find(|(b, _)| window.is_cut(*b) == is_cut);
+        first.map_or(steady_s, |(_, [from, to])| (to - from) / rate)
+    };
+    let air_std = window
+        .air()
+        .map(|r| noise_of_means::of_air(&values[r.clone()], rate, block_s(false), sample_std(&values[r])))
+        .fold(0.0, f64::max);
+    let cut_std = noise_of_means::of_cut(spectrum, spindle_hz, block_s(true)).max(air_std);
     let lost = mean_integrals(values, zero, rate, &window.blocks);
     let (mut level, mut level_std) = (Vec::new(), Vec::new());
     for (b, [from, to]) in window.blocks.iter().enumerate() {
         let std = if window.is_cut(b) {
-            spectrum.sample_std.max(air_std)
+            cut_std
         } else {
             air_std.max(1e-12)
         };

@@ -129,12 +129,12 @@ pub fn section(campaign: &Campaign, findings: &DiagnosisFindings) -> ReportSecti
 
 /// Where no effect of the library explains what is left, or the one that is missing leaves something.
 fn what_the_data_draw(findings: &DiagnosisFindings) -> Option<Block> {
-    let found = findings.lead.as_ref()?.place.as_ref()?;
-    let place = found.places.first()?;
+    let lead = findings.lead.as_ref()?;
+    let place = lead.place.as_ref()?.places.first()?;
     let drawing = DrawnCurveFigure::of(place);
-    let begin = findings.diagnosis.winner().map_or_else(
+    let begin = lead.beside.as_ref().map_or_else(
         || "What".to_string(),
-        |missing| format!("With {} in the model, what", missing.label()),
+        |beside| format!("With {beside} in the model, what"),
     );
     let caption = format!(
         "{begin} a part of its own that acts {} would have to be, line by line, for the model to agree with the FRFs, and the simple \

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use argmin::core::{CostFunction, Error as ArgminError, Executor};
+use argmin::solver::brent::BrentOpt;
 use num_complex::Complex64;
 
 use super::axes_of_cuts::OtherAxes;
@@ -15,6 +17,9 @@ use crate::identify::forces::cutting_data::{CutData, CutKind};
 use crate::text::listed;
 
 pub(super) const SPEED_VARIATION: &str = "spindle-speed-variation";
+/// How often the range of what is tried is widened, and how often it is then divided at most.
+const WIDENED: usize = 6;
+const BRENT_STEPS: u64 = 40;
 /// Nobody slips by less: what so small a change of feed, depth, width or helix takes away is something else.
 const LEAST_SLIP: f64 = 0.02;
 
@@ -184,37 +189,19 @@ impl RecordChange {
 
     /// The best value with its standard error and χ², where there is one inside what is possible.
     fn best(&self, data: &CuttingData) -> Option<(f64, f64, f64)> {
-        let [low, high] = self.range();
+        let range = self.range();
         let chi2 = |value: f64| -> Option<f64> {
             let own = self.undone(data, value);
             Some(fit(&own)?.reduced_chi2 * data.value_count() as f64)
         };
-        let mut points: Vec<(f64, f64)> = Vec::new();
-        for &value in self.starts() {
-            points.push((value, chi2(value)?));
+        let (value, least) = least_of(&chi2, self.starts(), range)?;
+        let [low, high] = range;
+        let step = 1e-3 * value.abs().max(0.01 * (high - low));
+        let middle = value.clamp(low + step, high - step);
+        let mut around = [(middle, least); 3];
+        for (point, off) in around.iter_mut().zip([-step, 0.0, step]) {
+            *point = (middle + off, chi2(middle + off)?);
         }
-        let mut around = [points[0]; 3];
-        for _ in 0..8 {
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let best = (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1))?;
-            let middle = best.clamp(1, points.len() - 2);
-            around = [points[middle - 1], points[middle], points[middle + 1]];
-            // At an end of what was tried the range is widened by half.
-            let width = 0.5 * (points[points.len() - 1].0 - points[0].0);
-            let next = match best {
-                0 => (points[0].0 - width).max(low),
-                i if i + 1 == points.len() => (points[i].0 + width).min(high),
-                _ => vertex(&around)?.clamp(low, high),
-            };
-            if points
-                .iter()
-                .any(|p| (p.0 - next).abs() < 1e-3 * (next.abs() + 1e-6))
-            {
-                break;
-            }
-            points.push((next, chi2(next)?));
-        }
-        let (value, least) = points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let curvature = curvature(&around)?;
         (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
     }
@@ -588,6 +575,54 @@ fn samples(data: &CuttingData, length_s: f64) -> String {
     })
 }
 
+/// Where `f` is least and how small it is there: the least of `starts`, which rise, then Brent's method between its neighbours; within
+/// `range`.
+fn least_of(f: &impl Fn(f64) -> Option<f64>, starts: &[f64], [low, high]: [f64; 2]) -> Option<(f64, f64)> {
+    let mut points = Vec::with_capacity(starts.len() + WIDENED);
+    for &start in starts {
+        points.push((start, f(start)?));
+    }
+    let least =
+        |points: &[(f64, f64)]| (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1));
+    for _ in 0..WIDENED {
+        // At an end of what was tried the range is widened by half.
+        let [first, last] = [points[0].0, points[points.len() - 1].0];
+        let width = 0.5 * (last - first);
+        match least(&points)? {
+            0 if first > low => points.insert(0, ((first - width).max(low), f((first - width).max(low))?)),
+            i if i + 1 == points.len() && last < high => {
+                points.push(((last + width).min(high), f((last + width).min(high))?));
+            }
+            _ => break,
+        }
+    }
+    let best = least(&points)?;
+    let between = [best.saturating_sub(1), (best + 1).min(points.len() - 1)].map(|i| points[i].0);
+    let brent = BrentOpt::new(between[0], between[1]).set_tolerance(1e-6, 1e-6 * (high - low));
+    let found = Executor::new(Scalar(f), brent)
+        .configure(|state| state.max_iters(BRENT_STEPS))
+        .run()
+        .ok()?;
+    let found = (found.state.best_param?, found.state.best_cost);
+    Some(
+        [found, points[best]]
+            .into_iter()
+            .min_by(|a, b| a.1.total_cmp(&b.1))?,
+    )
+}
+
+/// A function of one value, as argmin takes it; what cannot be computed is as bad as can be.
+struct Scalar<'a, F>(&'a F);
+
+impl<F: Fn(f64) -> Option<f64>> CostFunction for Scalar<'_, F> {
+    type Param = f64;
+    type Output = f64;
+
+    fn cost(&self, value: &f64) -> std::result::Result<f64, ArgminError> {
+        Ok((self.0)(*value).unwrap_or(f64::MAX))
+    }
+}
+
 /// Second derivative of the parabola through three points.
 fn curvature(points: &[(f64, f64)]) -> Option<f64> {
     let [(a, fa), (b, fb), (c, fc)] = *points else {
@@ -598,28 +633,27 @@ fn curvature(points: &[(f64, f64)]) -> Option<f64> {
     second.is_finite().then_some(second)
 }
 
-/// Where the parabola through three points is lowest.
-fn vertex(points: &[(f64, f64)]) -> Option<f64> {
-    let [(a, fa), (b, fb), _] = *points else {
-        return None;
-    };
-    let second = curvature(points)?;
-    if second <= 0.0 {
-        return Some(a);
-    }
-    let slope_at_middle = (fb - fa) / (b - a);
-    Some(0.5 * (a + b) - slope_at_middle / second)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_vertex_of_a_parabola_is_found() {
+    fn the_curvature_of_a_parabola_is_found() {
         let f = |x: f64| 3.0 + 5.0 * (x - 0.7).powi(2);
         let points = [-1.0, 0.2, 2.0].map(|x| (x, f(x)));
-        assert!((vertex(&points).unwrap() - 0.7).abs() < 1e-12);
         assert!((curvature(&points).unwrap() - 10.0).abs() < 1e-12);
+    }
+
+    /// A valley as sharp and as lopsided as a slip in one feed makes it, beyond the starts and at the end of the range.
+    #[test]
+    fn the_least_is_found_to_the_last_digit() {
+        let at = |bottom: f64| move |x: f64| Some(1e6 * ((x - bottom).exp() - 1.0 - (x - bottom)) + 7.0);
+        for bottom in [-1.9, -0.48, 0.0, 0.481, 2.1] {
+            let (value, least) = least_of(&at(bottom), &[-0.7, -0.2, 0.2, 0.7], [-2.5, 2.5]).unwrap();
+            assert!((value - bottom).abs() < 1e-5, "{value} for {bottom}");
+            assert!((least - 7.0).abs() < 1e-3, "{least}");
+        }
+        let (value, _) = least_of(&at(9.0), &[-0.7, -0.2, 0.2, 0.7], [-2.5, 2.5]).unwrap();
+        assert!((value - 2.5).abs() < 1e-4, "{value}");
     }
 }

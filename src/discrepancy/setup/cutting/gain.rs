@@ -17,6 +17,8 @@ const NAMES: [&str; 4] = ["Fx", "Fy", "Fz", "Mz"];
 const DEVIATES: f64 = 0.05;
 /// A deviation is so many standard errors, and so many times as far as the cuts scatter.
 const BEYOND: f64 = 5.0;
+/// A channel that is off by less than this share of what the farthest is off is off for a reason of its own.
+const ASIDE: f64 = 0.2;
 /// A gain that is less certain than this says nothing.
 const CERTAIN: f64 = 0.1;
 /// Gains this near, over the larger, are those of one mistake.
@@ -195,7 +197,13 @@ fn pattern(cuts: Vec<usize>, gains: &Gains, usual: &[(f64, f64); 4]) -> Option<O
             })
         })
         .collect();
-    let other: Vec<&Known> = known.iter().filter(|k| k.deviates).collect();
+    // What one channel does is told although a zero that is a little off, or a leak, shows in another.
+    let off = |k: &Known| (k.gain - 1.0).abs();
+    let farthest = known.iter().map(off).fold(0.0, f64::max);
+    let other: Vec<&Known> = known
+        .iter()
+        .filter(|k| k.deviates && off(k) > ASIDE * farthest)
+        .collect();
     let (channel, factor, is_dead) = match other.as_slice() {
         [] => return None,
         [one] if known.len() > 1 => {

@@ -28,7 +28,7 @@ use crate::text::listed;
 use axes_of_cuts::other_axes;
 use change::{RecordChange, SPEED_VARIATION};
 use direction::milling_direction;
-use gain::other_gains;
+use gain::{OtherGain, other_gains};
 use plausible::{FittedReading, IMPLAUSIBLE, MUCH_BETTER, SUSPICIOUS, fit, improbability, worst_cuts};
 use records::{CERTAIN, ToldByRecords};
 use robust::RobustFit;
@@ -150,6 +150,11 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     let base = model.and_then(|model| calibrate_cutting(&model, data));
     let found = [milling_direction(data, base.as_ref().ok()), dyno_axes(data)?];
     let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
+    // A channel without its gain in some cuts looks like another reading as well, which leaves more.
+    let least = match least {
+        Some((_, left)) if left >= SUSPICIOUS && a_gain_leaves_less(data, left)? => None,
+        least => least,
+    };
     if let Some((finding, left)) = least {
         // Channels in another order in some cuts look like another reading of some or all, which leaves more.
         let (finding, left) = match left < SUSPICIOUS {
@@ -187,6 +192,26 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
 /// Whether the fitted model leaves more than noise.
 fn leaves_more_than_noise(base: &Calibration, data: &CuttingData) -> bool {
     base.reduced_chi2 >= SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64)
+}
+
+/// Whether another gain of some cuts leaves much less than `left`.
+fn a_gain_leaves_less(data: &CuttingData, left: f64) -> Result<bool> {
+    if data.cuts.len() < FEWEST_CUTS {
+        return Ok(false);
+    }
+    let robust = RobustFit::of(data);
+    let far_off = far_off(robust.as_ref())?;
+    let leaves_less = |gain: &OtherGain| {
+        let right = match gain.is_dead {
+            true => gain.left_out(data),
+            false => Some(gain.undone(data, 1.0)),
+        };
+        let own = right.and_then(|data| fit(&data));
+        own.is_some_and(|own| own.reduced_chi2 < MUCH_BETTER * left)
+    };
+    Ok(other_gains(data, robust.as_ref(), &far_off)
+        .iter()
+        .any(leaves_less))
 }
 
 /// Channels in another order in some cuts, where that leaves much less than `left`; with what it leaves.

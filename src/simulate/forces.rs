@@ -172,6 +172,7 @@ impl Lab {
         CuttingSummary {
             process: Process::Milling,
             teeth: self.teeth,
+            teeth_in_doubt: false,
             straight_edge: true,
             one_helix: true,
             even_pitch: true,

@@ -31,6 +31,8 @@ pub struct CuttingSummary {
     pub process: Process,
     /// Teeth of the tool.
     pub teeth: usize,
+    /// The records show another number of teeth, or another speed of all cuts.
+    pub teeth_in_doubt: bool,
     /// The edge runs straight up the side of the tool.
     pub straight_edge: bool,
     /// All teeth have one helix angle.

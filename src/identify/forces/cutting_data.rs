@@ -725,6 +725,7 @@ fn summary(process: Process, teeth: usize, cuts: &[CutData]) -> CuttingSummary {
     CuttingSummary {
         process,
         teeth: teeth.max(1),
+        teeth_in_doubt: false,
         straight_edge: cuts
             .iter()
             .all(|c| !matches!(&c.kind, CutKind::Milling { cut, .. } if cut.shape.is_some())),

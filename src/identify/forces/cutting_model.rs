@@ -80,6 +80,7 @@ impl CuttingModel {
             .fold(1.0f64, |m, p| m.max(p.nominal.abs()));
         CuttingSummary {
             has_edge: self.has_edge,
+            teeth_in_doubt: data.slips.common_passing.is_some(),
             cutting_scale_n_per_mm2: scale,
             ..data.summary.clone()
         }

@@ -604,11 +604,9 @@ fn least_of(f: &impl Fn(f64) -> Option<f64>, starts: &[f64], [low, high]: [f64; 
         .run()
         .ok()?;
     let found = (found.state.best_param?, found.state.best_cost);
-    Some(
-        [found, points[best]]
-            .into_iter()
-            .min_by(|a, b| a.1.total_cmp(&b.1))?,
-    )
+    [found, points[best]]
+        .into_iter()
+        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// A function of one value, as argmin takes it; what cannot be computed is as bad as can be.

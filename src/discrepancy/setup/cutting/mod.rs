@@ -57,8 +57,11 @@ pub fn examine_cutting(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>
             ..SetupCheck::default()
         },
     };
-    let known = check.findings.iter().any(|f| f.kind == SPEED_VARIATION);
+    // What the records were put in step for is sure; that the rest may be more of it says little beside that.
+    let is_variation = |f: &SetupFinding| f.kind == SPEED_VARIATION;
+    let known = check.findings.iter().any(|f| is_variation(f) && f.is_likely());
     if let Some(finding) = speed_variation(data).filter(|_| !known) {
+        check.findings.retain(|f| !is_variation(f));
         check.findings.push(finding);
         check.last_taken_out = 1;
     }

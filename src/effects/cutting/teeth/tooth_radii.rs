@@ -1,4 +1,4 @@
-use crate::effects::cutting::common::{milling_only, one_helix_only};
+use crate::effects::cutting::common::{milling_only, one_helix_only, teeth_as_listed};
 use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, OwnTeeth};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, NEGLIGIBLE, Site};
@@ -61,7 +61,8 @@ impl Effect<Cutting> for ToothRadii {
     }
 
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
-        milling_only(data).or_else(|| one_helix_only(data)).or_else(|| {
+        let general = milling_only(data).or_else(|| one_helix_only(data));
+        general.or_else(|| teeth_as_listed(data)).or_else(|| {
             (data.teeth < 3).then(|| {
                 "of two teeth a short one is what runout looks like, too (runout is tried)".to_string()
             })

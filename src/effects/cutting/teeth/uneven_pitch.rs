@@ -1,4 +1,4 @@
-use crate::effects::cutting::common::{milling_only, one_helix_only};
+use crate::effects::cutting::common::{milling_only, one_helix_only, teeth_as_listed};
 use crate::effects::cutting::{CutPhysics, CutSetting, Cutting, CuttingSummary, OwnTeeth};
 use crate::effects::usual_size::{FollowsSize, SizeRange, UsualSize};
 use crate::effects::{At, Effect, Known, Site};
@@ -57,6 +57,7 @@ impl Effect<Cutting> for UnevenPitch {
     fn obstacle(&self, Known { data, .. }: &Known<Cutting>) -> Option<String> {
         milling_only(data)
             .or_else(|| one_helix_only(data))
+            .or_else(|| teeth_as_listed(data))
             .or_else(|| (data.teeth < 2).then(|| "a single tooth has no pitch to others".to_string()))
             .or_else(|| {
                 (!data.even_pitch)

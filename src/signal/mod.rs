@@ -10,7 +10,6 @@ pub mod frf_noise;
 mod local_rational;
 mod mains;
 pub mod noise_law;
-pub(crate) mod noise_of_means;
 mod order_spectrum;
 mod pulses;
 mod spindle_track;

@@ -7,7 +7,8 @@ use num_complex::Complex64;
 use crate::data::Sample;
 use crate::identify::forces::asynchronous_lines::AsynchronousLines;
 use crate::identify::forces::cutting_windows::Windows;
-use crate::signal::{OrderSpectrum, mean_between, noise_of_means};
+use crate::identify::forces::noise_of_means;
+use crate::signal::{OrderSpectrum, mean_between};
 
 /// One recorded channel of one cut.
 #[derive(Debug, Clone)]

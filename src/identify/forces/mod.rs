@@ -13,3 +13,4 @@ pub(crate) mod cutting_windows;
 pub(crate) mod force_channel;
 #[cfg(test)]
 pub(crate) mod made_cuts;
+mod noise_of_means;

@@ -7,9 +7,8 @@ use std::ops::Range;
 
 use realfft::RealFftPlanner;
 
-use super::blocks::{line, median};
-use super::order_spectrum::OrderSpectrum;
 use crate::data::Sample;
+use crate::signal::{OrderSpectrum, line, median};
 
 /// Lines that speak for a mean over T reach from 1/T to this many times that, …
 const REACH: f64 = 6.0;
@@ -92,7 +91,7 @@ fn excess(slow: &[f64], usual: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::signal::order_spectrum::order_spectrum;
+    use crate::signal::order_spectrum;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 

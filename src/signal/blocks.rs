@@ -48,14 +48,18 @@ impl SignalBlocks {
             mean.push(m);
             std_dev.push((block().map(|v| (v - m).powi(2)).sum::<f64>() / n).sqrt());
         }
-        // A ramp of height d within a block has variance d²/12. Where the level steps on one side there is none.
+        // A ramp of height d within a block has variance d²/12. What would take most of the variance away is a ramp only where it goes on
+        // alike on both sides: else the level steps on one of them.
         for i in 1..count.saturating_sub(1) {
             let [before, after] = [mean[i] - mean[i - 1], mean[i + 1] - mean[i]];
-            let ramp = match before * after > 0.0 {
-                true => before.abs().min(after.abs()),
-                false => 0.0,
-            };
             let variance = std_dev[i] * std_dev[i];
+            let mut ramp = 0.5 * (before + after);
+            if ramp * ramp / 12.0 > 0.5 * variance {
+                ramp = match before * after > 0.0 {
+                    true => before.abs().min(after.abs()),
+                    false => 0.0,
+                };
+            }
             std_dev[i] = (variance - ramp * ramp / 12.0).max(0.01 * variance).sqrt();
         }
         SignalBlocks {

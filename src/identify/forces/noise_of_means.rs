@@ -11,7 +11,7 @@ use crate::data::Sample;
 use crate::signal::{OrderSpectrum, line, median};
 
 /// Lines that speak for a mean over T reach from 1/T to this many times that, …
-const REACH: f64 = 6.0;
+const REACH: f64 = 4.0;
 /// … or so far that there are this many.
 const ENOUGH_LINES: usize = 24;
 /// Fewer say nothing.
@@ -130,7 +130,7 @@ mod tests {
         for corner_hz in [1e6, 300.0, 80.0] {
             let truth = scatter(&noise(1, corner_hz, 1_000_000), n);
             let (mut cut, mut air) = (Vec::new(), Vec::new());
-            for seed in 2..12 {
+            for seed in 2..32 {
                 let samples = noise(seed, corner_hz, 8000);
                 let spectrum = order_spectrum(&samples, RATE_HZ, PER_TURN, 40).unwrap();
                 cut.push(of_cut(&spectrum, RATE_HZ / PER_TURN, length_s));

@@ -9,20 +9,18 @@ the model that looks for it, and the noise comes after (before it, where a filte
 kind, and the cut or the channel where it is of one. Explicit seeds; a CSV that is there already is continued. Needs numpy.
 """
 
-import argparse
-import csv
-import json
 import math
 import pathlib
 import random
 import re
-import subprocess
 import tempfile
 import time
 
 import numpy
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
+from random_campaigns import lobestone
+from setup_mistakes import try_kinds
+
 FIELDS = ["seed", "kind", "where", "value", "said", "said_where", "said_value", "std_error", "confidence", "named",
           "verdict", "verdict_confidence", "seconds"]  # fmt: skip
 # Steps between two samples where a record is taken at other times.
@@ -152,25 +150,16 @@ def drooping_speed(c, draw):
     return "all", share
 
 
-def feed_override(c, draw):
-    index = draw.randrange(len(c.cuts))
-    factor = away_from_one(draw, 1.1, 2.0)
-    c.stated(index, "feed_per_tooth_mm", lambda feed: feed / factor)
-    return c.name(index), factor
+def stated_wrongly(key, least, most):
+    """One number of one cut is off by a factor."""
 
+    def make(c, draw):
+        index = draw.randrange(len(c.cuts))
+        factor = away_from_one(draw, least, most)
+        c.stated(index, key, lambda value: value / factor)
+        return c.name(index), factor
 
-def axial_depth(c, draw):
-    index = draw.randrange(len(c.cuts))
-    factor = away_from_one(draw, 1.15, 2.0)
-    c.stated(index, "axial_depth_mm", lambda depth: depth / factor)
-    return c.name(index), factor
-
-
-def spindle_speed(c, draw):
-    index = draw.randrange(len(c.cuts))
-    factor = away_from_one(draw, 1.03, 1.6)
-    c.stated(index, "spindle_rpm", lambda speed: speed / factor)
-    return c.name(index), factor
+    return make
 
 
 def cut_swap(c, draw):
@@ -220,9 +209,9 @@ KINDS = {
     "amplifier-low-pass": ("amplifier-low-pass", low_pass, True),
     "wandering-speed": ("spindle-speed-variation", wandering_speed, False),
     "drooping-speed": ("spindle-speed-variation", drooping_speed, False),
-    "feed-override": ("feed-override", feed_override, False),
-    "axial-depth": ("axial-depth", axial_depth, False),
-    "spindle-speed": ("spindle-speed", spindle_speed, False),
+    "feed-override": ("feed-override", stated_wrongly("feed_per_tooth_mm", 1.1, 2.0), False),
+    "axial-depth": ("axial-depth", stated_wrongly("axial_depth_mm", 1.15, 2.0), False),
+    "spindle-speed": ("spindle-speed", stated_wrongly("spindle_rpm", 1.03, 1.6), False),
     "cut-swap": ("cut-swap", cut_swap, False),
     "teeth": ("teeth", teeth, False),
     "helix": ("helix", helix, False),
@@ -233,44 +222,11 @@ KINDS = {
 
 
 def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("--count", type=int, default=20)
-    arguments.add_argument("--first-seed", type=int, default=1)
-    arguments.add_argument("--kinds", default=",".join(KINDS))
-    arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--command", default="diagnose", choices=["diagnose", "cfc"])
-    arguments.add_argument("--table", type=pathlib.Path, default=ROOT / "reports/force_mistakes.csv")
-    arguments.add_argument("--keep", type=pathlib.Path, help="keep the campaigns in this folder")
-    options = arguments.parse_args()
-    rows = list(csv.DictReader(options.table.open(newline=""))) if options.table.exists() else []
-    done = {(r["kind"], int(r["seed"])) for r in rows}
-    for kind in options.kinds.split(","):
-        for seed in range(options.first_seed, options.first_seed + options.count):
-            if (kind, seed) in done:
-                continue
-            rows.append(one(options, kind, seed))
-            write(options.table, rows)
-            print(" ".join(f"{rows[-1][f]}" for f in FIELDS), flush=True)
+    rows = try_kinds(__doc__, KINDS, FIELDS, one, ["diagnose", "cfc"], "force_mistakes.csv")
     for kind in KINDS:
         own = [r for r in rows if r["kind"] == kind]
         if own:
             print(f"{kind}: {sum(r['named'] == 'yes' for r in own)} of {len(own)} named")
-
-
-def write(table, rows):
-    temporary = table.with_suffix(".csv.tmp")
-    with temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        writer.writeheader()
-        writer.writerows(rows)
-    temporary.replace(table)
-
-
-def run(options, *arguments):
-    done = subprocess.run([options.lobestone, *arguments, "--json"], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise SystemExit(f"lobestone {' '.join(arguments)} failed:\n{done.stderr}")
-    return json.loads(done.stdout)
 
 
 def one(options, kind, seed):
@@ -279,7 +235,7 @@ def one(options, kind, seed):
     expected, make, noise_first = KINDS[kind]
     with tempfile.TemporaryDirectory() as scratch:
         folder = (options.keep or pathlib.Path(scratch)) / f"{kind}-{seed}"
-        run(options, "simulate", "--milling", "--out", str(folder), "--seed", str(40_000 + seed), "--noise-n", "0")
+        lobestone(options.lobestone, "simulate", "--milling", "--out", str(folder), "--seed", str(40_000 + seed), "--noise-n", "0")
         campaign = Campaign(folder)
         sigma_n = math.exp(draw.uniform(math.log(1.0), math.log(10.0)))
         if noise_first:
@@ -289,7 +245,7 @@ def one(options, kind, seed):
             campaign.add_noise(noise, sigma_n)
         campaign.write()
         started = time.monotonic()
-        found = run(options, options.command, str(folder))
+        found = lobestone(options.lobestone, options.command, str(folder))
         seconds = time.monotonic() - started
     mine = [s for s in found["setup"] if s["kind"] == expected and s["confidence"] >= 0.5]
     best = max(mine or found["setup"], key=lambda s: s["confidence"], default=None)

@@ -101,10 +101,10 @@ def known(table):
         return [dict.fromkeys(FIELDS, "") | row for row in csv.DictReader(file)]
 
 
-def write_rows(table, rows):
+def write_rows(table, rows, fields=FIELDS):
     temporary = table.with_suffix(".csv.tmp")
     with temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
+        writer = csv.DictWriter(file, fields)
         writer.writeheader()
         writer.writerows(rows)
     temporary.replace(table)

@@ -18,9 +18,10 @@ import math
 import pathlib
 import random
 import re
-import subprocess
 import tempfile
 import time
+
+from random_campaigns import lobestone, write_rows
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TIERS = ["careful", "direct", "dirty"]
@@ -288,14 +289,15 @@ KINDS = {
 NOT_DIRECT = {"hit-direction"}
 
 
-def main():
-    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def try_kinds(description, kinds, fields, one, commands, table):
+    """Makes `one(options, kind, seed)` a row of the table for each seed and kind that is asked for and not there yet; returns all rows."""
+    arguments = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     arguments.add_argument("--count", type=int, default=20)
     arguments.add_argument("--first-seed", type=int, default=1)
-    arguments.add_argument("--kinds", default=",".join(KINDS))
+    arguments.add_argument("--kinds", default=",".join(kinds))
     arguments.add_argument("--lobestone", default=str(ROOT / "target/release/lobestone"))
-    arguments.add_argument("--command", default="calibrate", choices=["calibrate", "diagnose", "compare"])
-    arguments.add_argument("--table", type=pathlib.Path, default=ROOT / "reports/setup_mistakes.csv")
+    arguments.add_argument("--command", default=commands[0], choices=commands)
+    arguments.add_argument("--table", type=pathlib.Path, default=ROOT / "reports" / table)
     arguments.add_argument("--keep", type=pathlib.Path, help="keep the campaigns in this folder")
     options = arguments.parse_args()
     rows = list(csv.DictReader(options.table.open(newline=""))) if options.table.exists() else []
@@ -306,9 +308,14 @@ def main():
                 continue
             row = one(options, kind, seed)
             rows.append(row)
-            rows.sort(key=lambda r: (list(KINDS).index(r["kind"]), int(r["seed"])))
-            write(options.table, rows)
-            print(" ".join(f"{row[f]}" for f in FIELDS), flush=True)
+            rows.sort(key=lambda r: (list(kinds).index(r["kind"]), int(r["seed"])))
+            write_rows(options.table, rows, fields)
+            print(" ".join(f"{row[f]}" for f in fields), flush=True)
+    return rows
+
+
+def main():
+    rows = try_kinds(__doc__, KINDS, FIELDS, one, ["calibrate", "diagnose", "compare"], "setup_mistakes.csv")
     for kind in KINDS:
         own = [r for r in rows if r["kind"] == kind]
         if own:
@@ -318,36 +325,20 @@ def main():
                   f"{sum(bool(r['within']) for r in own)}")
 
 
-def write(table, rows):
-    temporary = table.with_suffix(".csv.tmp")
-    with temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        writer.writeheader()
-        writer.writerows(rows)
-    temporary.replace(table)
-
-
-def run(options, *arguments):
-    done = subprocess.run([options.lobestone, *arguments, "--json"], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise SystemExit(f"lobestone {' '.join(arguments)} failed:\n{done.stderr}")
-    return json.loads(done.stdout)
-
-
 def one(options, kind, seed):
     draw = random.Random(f"{kind} {seed}")
     tiers = [t for t in TIERS if not (t == "direct" and kind in NOT_DIRECT)]
     tier = tiers[seed % len(tiers)]
     with tempfile.TemporaryDirectory() as scratch:
         folder = (options.keep or pathlib.Path(scratch)) / f"{kind}-{seed}"
-        run(options, "simulate", "--out", str(folder), "--kind", tier, "--seed", str(7000 + seed), "--noise", "0",
+        lobestone(options.lobestone, "simulate", "--out", str(folder), "--kind", tier, "--seed", str(7000 + seed), "--noise", "0",
             "--noise-floor", "0", "--format", "csv")  # fmt: skip
         campaign = Campaign(folder)
         where, value = KINDS[kind](campaign, draw)
         campaign.add_noise(draw, *NOISE[tier])
         campaign.write()
         started = time.monotonic()
-        found = run(options, options.command, str(folder))
+        found = lobestone(options.lobestone, options.command, str(folder))
         seconds = time.monotonic() - started
     best = max(found["setup"], key=lambda s: s["confidence"], default=None)
     if best is not None and best["confidence"] < 0.5:

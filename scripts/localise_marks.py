@@ -70,7 +70,7 @@ def pairs(kind, truth, first):
             for part in (first, second)
             for p in ("", "second_")
         ]
-        fits = [(where, fit) for where, fit in fits if fit[0][0] is not None]
+        fits = [(where, fit) for where, fit in fits if all(value is not None for value, _ in fit)]
         along = [where for where, _ in fits]
         for i, a in enumerate(t["axis"]):
             here = f"{truth['site']}.{axis(a)}"

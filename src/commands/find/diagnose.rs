@@ -66,7 +66,7 @@ pub fn structure(campaign: &Campaign, findings: &DiagnosisFindings) -> Outcome {
         lead: place_drawn(findings)
             .and_then(|found| found.places.first())
             .map(PlaceDrawn::of),
-        lead_beside: findings.lead.as_ref().and_then(|lead| lead.beside.as_deref()),
+        lead_beside: drawn_beside(findings),
         wrong_links: wrong_links(findings),
         joint_trends: joints.map_or(&[], |j| &j.trends),
         joint_courses: joints.map_or(&[], |j| &j.courses),
@@ -85,6 +85,10 @@ fn wrong_links(findings: &DiagnosisFindings) -> Option<&WrongLinks> {
 
 fn place_drawn(findings: &DiagnosisFindings) -> Option<&Localisation> {
     findings.lead.as_ref()?.place.as_ref()
+}
+
+fn drawn_beside(findings: &DiagnosisFindings) -> Option<&str> {
+    findings.lead.as_ref()?.beside.as_deref()
 }
 
 fn joint_trends(findings: &DiagnosisFindings) -> Option<&JointTrends> {
@@ -495,7 +499,7 @@ fn where_it_shows(findings: &DiagnosisFindings) -> String {
     }
     if let Some(found) = place_drawn(findings) {
         let drawn = localise::in_words(found);
-        let told = match findings.lead.as_ref().and_then(|lead| lead.beside.as_ref()) {
+        let told = match drawn_beside(findings) {
             Some(beside) => format!(
                 "Of what {beside} leaves {drawn}. `lobestone localise` draws it once {beside} is in the model."
             ),

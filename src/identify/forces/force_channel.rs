@@ -44,15 +44,6 @@ impl ForceChannel {
     }
 }
 
-/// White noise of a stretch of air: differences of neighbouring samples know no drift and little hum.
-fn sample_std<S: Sample>(samples: &[S]) -> f64 {
-    let squares: f64 = samples
-        .windows(2)
-        .map(|w| (w[1].value() - w[0].value()).powi(2))
-        .sum();
-    (0.5 * squares / samples.len().saturating_sub(1).max(1) as f64).sqrt()
-}
-
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn force_channel<S: Sample>(
     values: &[S],
@@ -78,7 +69,7 @@ pub(crate) fn force_channel<S: Sample>(
     };
     let air_std = window
         .air()
-        .map(|r| noise_of_means::of_air(&values[r.clone()], rate, block_s(false), sample_std(&values[r])))
+        .map(|r| noise_of_means::of_air(&values[r], rate, block_s(false)))
         .fold(0.0, f64::max);
     let cut_std = noise_of_means::of_cut(spectrum, spindle_hz, block_s(true)).max(air_std);
     let lost = mean_integrals(values, zero, rate, &window.blocks);
@@ -209,21 +200,6 @@ pub(crate) fn lines_in_mean(spectrum: &OrderSpectrum, rate: f64, length_s: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::SeedableRng;
-
-    /// Neighbours of white noise differ by √2 σ; a slope of a fiftieth of σ a sample hides nothing.
-    #[test]
-    fn the_noise_of_air_is_known_whatever_drifts_below_it() {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let samples: Vec<f64> = (0..40_000)
-            .map(|i| {
-                let normal = crate::statistics::nearly_normal(&mut random);
-                3.0 * normal + 0.06 * f64::from(i)
-            })
-            .collect();
-        approx::assert_relative_eq!(sample_std(&samples), 3.0, max_relative = 0.02);
-        assert_eq!(sample_std(&[1.0]), 0.0);
-    }
 
     #[test]
     fn integrals_are_those_of_all_samples_kept() {

@@ -3,8 +3,6 @@
 //! The mean over T hears what is slower than about 1/T and hardly anything else. An amplifier's low-pass takes from what is quick, a
 //! table that resonates adds to it: neither says anything about means, but both are most of what a record shows of its noise.
 
-use std::ops::Range;
-
 use realfft::RealFftPlanner;
 
 use crate::data::Sample;
@@ -38,9 +36,9 @@ pub(crate) fn of_cut(spectrum: &OrderSpectrum, spindle_hz: f64, length_s: f64) -
     spectrum.sample_std * excess(&slow, usual).sqrt()
 }
 
-/// The same for a stretch without cutting, whose samples have the white noise `white_std`; a straight drift is none.
-pub(crate) fn of_air<S: Sample>(samples: &[S], sample_rate_hz: f64, length_s: f64, white_std: f64) -> f64 {
-    let count = samples.len();
+/// The same for a stretch without cutting; a straight drift is none.
+pub(crate) fn of_air<S: Sample>(samples: &[S], sample_rate_hz: f64, length_s: f64) -> f64 {
+    let (count, white_std) = (samples.len(), sample_std(samples));
     if count < 4 * FEWEST_LINES {
         return white_std;
     }
@@ -60,6 +58,15 @@ pub(crate) fn of_air<S: Sample>(samples: &[S], sample_rate_hz: f64, length_s: f6
     white_std * excess(&slow, white).sqrt()
 }
 
+/// White noise of a stretch of air: differences of neighbouring samples know no drift and little hum.
+fn sample_std<S: Sample>(samples: &[S]) -> f64 {
+    let squares: f64 = samples
+        .windows(2)
+        .map(|w| (w[1].value() - w[0].value()).powi(2))
+        .sum();
+    (0.5 * squares / samples.len().saturating_sub(1).max(1) as f64).sqrt()
+}
+
 /// Lines, `line_hz` apart, that speak for means over `length_s`.
 fn slow_lines(
     line_hz: f64,
@@ -69,8 +76,7 @@ fn slow_lines(
 ) -> impl Iterator<Item = usize> {
     let first = (1.0 / (length_s * line_hz)).ceil().max(1.0) as usize;
     let last = (REACH / (length_s * line_hz)) as usize;
-    let lines: Range<usize> = first..count;
-    lines
+    (first..count)
         .filter(move |j| counts(*j))
         .enumerate()
         .take_while(move |(k, j)| *k < ENOUGH_LINES || *j <= last)
@@ -97,6 +103,20 @@ mod tests {
 
     const RATE_HZ: f64 = 5000.0;
     const PER_TURN: f64 = 137.3;
+
+    /// Neighbours of white noise differ by √2 σ; a slope of a fiftieth of σ a sample hides nothing.
+    #[test]
+    fn the_noise_of_air_is_known_whatever_drifts_below_it() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let samples: Vec<f64> = (0..40_000)
+            .map(|i| {
+                let normal = crate::statistics::nearly_normal(&mut random);
+                3.0 * normal + 0.06 * f64::from(i)
+            })
+            .collect();
+        approx::assert_relative_eq!(sample_std(&samples), 3.0, max_relative = 0.02);
+        assert_eq!(sample_std(&[1.0]), 0.0);
+    }
 
     /// Noise of 2 N per sample through a first-order low-pass.
     fn noise(seed: u64, corner_hz: f64, count: usize) -> Vec<f64> {
@@ -134,9 +154,7 @@ mod tests {
                 let samples = noise(seed, corner_hz, 8000);
                 let spectrum = order_spectrum(&samples, RATE_HZ, PER_TURN, 40).unwrap();
                 cut.push(of_cut(&spectrum, RATE_HZ / PER_TURN, length_s));
-                let differences = samples.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>();
-                let white = (0.5 * differences / samples.len() as f64).sqrt();
-                air.push(of_air(&samples, RATE_HZ, length_s, white));
+                air.push(of_air(&samples, RATE_HZ, length_s));
             }
             for said in [cut, air] {
                 let mean = said.iter().sum::<f64>() / said.len() as f64;

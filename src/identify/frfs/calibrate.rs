@@ -251,12 +251,12 @@ const LOOK_ITERATIONS: usize = 10;
 const HOPELESS: f64 = 1.5;
 
 /// The likelihood from a point that is in the right basin already: log magnitudes could only lead out of it.
-fn resume(model: &StructureModel, sketch: &FrfData, start: &[f64]) -> Result<(Fit, usize)> {
+fn resume(model: &StructureModel, sketch: &FrfData, start: &[f64], rough: Stopping) -> Result<(Fit, usize)> {
     let fit = minimise(
         &problem(model, sketch, Misfit::Complex),
         start,
         &model.bounds(),
-        ROUGH,
+        rough,
     )?;
     let iterations = fit.iterations;
     Ok((fit, iterations))
@@ -348,22 +348,34 @@ const LARGEST_LN_FACTOR: f64 = 3.5;
 const ONE_JOINT: i32 = 8;
 /// … this far apart, natural logarithm.
 const ONE_JOINT_STEP: f64 = 0.25;
+/// The same by the likelihood, whose valleys are as narrow as resonances are: a fortieth of a frequency apart.
+const ONE_JOINT_NARROW: i32 = 40;
+const ONE_JOINT_NARROW_STEP: f64 = 0.05;
 /// A joint that is further than this from the robot file, natural logarithm, is tried there, too.
 const FAR_LN_FACTOR: f64 = 1.5;
 /// Starting points that a scan may give, and how often single joints are scanned.
 const SCANNED: usize = 3;
 const ROUNDS: usize = 4;
 
-/// Where a scan of `values` along `direction` from `theta` has its local minima of the log magnitudes' misfit, with their
-/// costs, other than the one in the middle.
-fn valleys(
-    problem: &FrfProblem<'_>,
-    theta: &[f64],
-    bounds: &[[f64; 2]],
-    moved: &[usize],
-    offsets: &[f64],
-) -> Vec<(f64, Vec<f64>)> {
-    let points: Vec<(f64, Vec<f64>)> = offsets
+/// A further starting point.
+#[derive(Debug, Clone)]
+struct Start {
+    theta: Vec<f64>,
+    /// By what it is followed first: log magnitudes lead to an optimum from afar, and out of a narrow one.
+    by: Misfit,
+}
+
+impl Start {
+    fn afar(theta: Vec<f64>) -> Start {
+        let by = Misfit::LogMagnitude;
+        Start { theta, by }
+    }
+}
+
+/// Where a scan of `moved` by `offsets` from `theta` has its local minima, with their costs, other than the one in the middle.
+fn valleys(problem: &FrfProblem<'_>, theta: &[f64], moved: &[usize], offsets: &[f64]) -> Vec<(f64, Start)> {
+    let bounds = problem.model.bounds();
+    let points: Vec<(f64, Start)> = offsets
         .par_iter()
         .map(|offset| {
             stop::point();
@@ -371,7 +383,9 @@ fn valleys(
             for &i in moved {
                 point[i] = (point[i] + offset).clamp(bounds[i][0], bounds[i][1]);
             }
-            (problem.cost(&point).unwrap_or(f64::INFINITY), point)
+            let cost = problem.cost(&point).unwrap_or(f64::INFINITY);
+            let by = problem.misfit;
+            (cost, Start { theta: point, by })
         })
         .collect();
     let cost = |i: usize| points[i].0;
@@ -382,58 +396,77 @@ fn valleys(
         .collect()
 }
 
-/// A look at very few of the data along lines through the parameters: where further starting points promise most.
+/// A look at few of the data along lines through the parameters: where further starting points promise most.
 struct Scan<'a> {
     model: &'a StructureModel,
-    glance: &'a FrfData,
-    bounds: Vec<[f64; 2]>,
+    sketch: &'a FrfData,
+    /// Very few, which is enough for log magnitudes.
+    glance: FrfData,
 }
 
 impl Scan<'_> {
-    fn valleys(&self, theta: &[f64], moved: &[usize], count: i32, step: f64) -> Vec<(f64, Vec<f64>)> {
+    fn valleys(
+        &self,
+        by: Misfit,
+        theta: &[f64],
+        moved: &[usize],
+        (count, step): (i32, f64),
+    ) -> Vec<(f64, Start)> {
         let offsets: Vec<f64> = (-count..=count).map(|k| f64::from(k) * step).collect();
-        let problem = problem(self.model, self.glance, Misfit::LogMagnitude);
-        valleys(&problem, theta, &self.bounds, moved, &offsets)
+        let data = match by {
+            Misfit::LogMagnitude => &self.glance,
+            Misfit::Complex => self.sketch,
+        };
+        valleys(&problem(self.model, data, by), theta, moved, &offsets)
     }
 
     /// All joints stiffer or softer by one factor than the robot file says.
-    fn common_factor(&self) -> Vec<Vec<f64>> {
+    fn common_factor(&self) -> Vec<Start> {
         let joints: Vec<usize> = (0..self.model.robot.joint_count()).collect();
-        let step = LARGEST_LN_FACTOR / f64::from(FACTORS);
-        lowest(self.valleys(&self.model.nominal_theta(), &joints, FACTORS, step))
+        let steps = (FACTORS, LARGEST_LN_FACTOR / f64::from(FACTORS));
+        lowest(self.valleys(Misfit::LogMagnitude, &self.model.nominal_theta(), &joints, steps))
     }
 
     /// Joints that `found` has far from where the robot file does, put back there: beyond the reach of the scan along each joint
     /// a joint may have gone where another one could have taken up the misfit.
-    fn joints_put_back(&self, found: &[f64]) -> Option<Vec<f64>> {
+    fn joints_put_back(&self, found: &[f64]) -> Option<Start> {
         let nominal = self.model.nominal_theta();
         let far = |i: &usize| (found[*i] - nominal[*i]).abs() > FAR_LN_FACTOR;
         let gone: Vec<usize> = (0..self.model.robot.joint_count()).filter(far).collect();
         let mut back = found.to_vec();
         gone.iter().for_each(|&i| back[i] = nominal[i]);
-        (!gone.is_empty()).then_some(back)
+        (!gone.is_empty()).then(|| Start::afar(back))
     }
 
-    /// Single joints away from where `found` has them.
-    fn single_joints(&self, found: &[f64]) -> Vec<Vec<f64>> {
-        let joints = 0..self.model.robot.joint_count();
-        lowest(
-            joints
-                .flat_map(|joint| self.valleys(found, &[joint], ONE_JOINT, ONE_JOINT_STEP))
-                .collect(),
-        )
+    /// Single joints away from where `found`, on the sketch, has them. By log magnitudes from afar; by the likelihood those that are
+    /// hardly determined there, for it has narrow valleys: a joint whose resonance has left the measured band comes back so.
+    fn single_joints(&self, found: &Fit) -> Vec<Start> {
+        let along = |by: Misfit, steps: (i32, f64), joints: &[usize]| -> Vec<(f64, Start)> {
+            let valleys = |joint: &usize| self.valleys(by, &found.theta, &[*joint], steps);
+            joints.iter().flat_map(valleys).collect()
+        };
+        let all: Vec<usize> = (0..self.model.robot.joint_count()).collect();
+        let rise = |joint: usize| 0.5 * found.hessian[(joint, joint)] * ONE_JOINT_STEP.powi(2);
+        let is_loose = |joint: &usize| rise(*joint) < (HOPELESS - 1.0) * found.cost;
+        let loose: Vec<usize> = all.iter().copied().filter(is_loose).collect();
+        let narrow = (ONE_JOINT_NARROW, ONE_JOINT_NARROW_STEP);
+        let mut close = along(Misfit::Complex, narrow, &loose);
+        close.retain(|(cost, _)| *cost < HOPELESS * found.cost);
+        let mut starts = lowest(along(Misfit::LogMagnitude, (ONE_JOINT, ONE_JOINT_STEP), &all));
+        starts.extend(lowest(close));
+        starts
     }
 }
 
 /// The most promising starting points of a scan.
-fn lowest(mut points: Vec<(f64, Vec<f64>)>) -> Vec<Vec<f64>> {
+fn lowest(mut points: Vec<(f64, Start)>) -> Vec<Start> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points.truncate(SCANNED);
     points.into_iter().map(|(_, point)| point).collect()
 }
 
 /// Short fits from `points`, and to their end those that are not left far behind, `first` among them; best first.
-fn race(model: &StructureModel, sketch: &FrfData, points: &[Vec<f64>], first: Fit) -> Vec<Fit> {
+fn race(model: &StructureModel, sketch: &FrfData, points: &[Start], first: Fit) -> Vec<Fit> {
     let progress = Progress::new("calibrating from further starting points", points.len());
     let look = Stopping {
         max_iterations: LOOK_ITERATIONS,
@@ -442,9 +475,12 @@ fn race(model: &StructureModel, sketch: &FrfData, points: &[Vec<f64>], first: Fi
     let looks: Vec<Fit> = points
         .par_iter()
         .filter_map(|start| {
-            let fit = approach(model, sketch, start, look).ok().map(|(fit, _)| fit);
+            let fit = match start.by {
+                Misfit::LogMagnitude => approach(model, sketch, &start.theta, look),
+                Misfit::Complex => resume(model, sketch, &start.theta, look),
+            };
             progress.step();
-            fit
+            fit.ok().map(|(fit, _)| fit)
         })
         .collect();
     // Starts that a look leaves far behind the others would only end in another optimum.
@@ -452,7 +488,7 @@ fn race(model: &StructureModel, sketch: &FrfData, points: &[Vec<f64>], first: Fi
     let mut fits: Vec<Fit> = looks
         .par_iter()
         .filter(|look| look.cost < HOPELESS * lowest)
-        .filter_map(|look| resume(model, sketch, &look.theta).ok().map(|(fit, _)| fit))
+        .filter_map(|look| resume(model, sketch, &look.theta, ROUGH).ok().map(|(fit, _)| fit))
         .collect();
     fits.push(first);
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -470,7 +506,7 @@ pub fn calibrate(
     let sketch_data = sketch(data, SKETCH_VALUES);
     let nominal = model.nominal_theta();
     let (mut first, mut iterations) = match model.start() {
-        Some(start) => resume(model, &sketch_data, start)?,
+        Some(start) => resume(model, &sketch_data, start, ROUGH)?,
         None => approach(model, &sketch_data, &nominal, ROUGH)?,
     };
     let (mut starts, mut agreeing) = (1, 1);
@@ -494,18 +530,17 @@ pub fn calibrate(
         }
     }
     if misfit(&first, &sketch_data) > SUSPICIOUS_CHI2 && options.extra_starts > 0 {
-        let glance = sketch(&sketch_data, GLANCE_VALUES);
         let scan = Scan {
             model,
-            glance: &glance,
-            bounds: model.bounds(),
+            sketch: &sketch_data,
+            glance: sketch(&sketch_data, GLANCE_VALUES),
         };
         let mut points = scan.common_factor();
-        let centre = points.first().unwrap_or(&nominal);
+        let centre = points.first().map_or(&nominal, |start| &start.theta);
         let scattered = scattered_about(&model.parameters, centre, options.extra_starts, options.seed);
-        points.extend(scattered);
+        points.extend(scattered.into_iter().map(Start::afar));
         for _ in 0..ROUNDS {
-            points.extend(scan.single_joints(&first.theta));
+            points.extend(scan.single_joints(&first));
             points.extend(scan.joints_put_back(&first.theta));
             let before = first.cost;
             let mut fits = race(model, &sketch_data, &points, first);

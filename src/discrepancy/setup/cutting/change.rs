@@ -198,11 +198,14 @@ impl RecordChange {
         let [low, high] = range;
         let step = 1e-3 * value.abs().max(0.01 * (high - low));
         let middle = value.clamp(low + step, high - step);
-        let mut around = [(middle, least); 3];
-        for (point, off) in around.iter_mut().zip([-step, 0.0, step]) {
-            *point = (middle + off, chi2(middle + off)?);
-        }
-        let curvature = curvature(&around)?;
+        let at = |value: f64| Some((value, chi2(value)?));
+        // At an end of what is possible the parabola stands beside it.
+        let here = if middle == value {
+            (value, least)
+        } else {
+            at(middle)?
+        };
+        let curvature = curvature(&[at(middle - step)?, here, at(middle + step)?])?;
         (curvature > 0.0).then(|| (value, (2.0 / curvature).sqrt(), least))
     }
 
@@ -578,10 +581,8 @@ fn samples(data: &CuttingData, length_s: f64) -> String {
 /// Where `f` is least and how small it is there: the least of `starts`, which rise, then Brent's method between its neighbours; within
 /// `range`.
 fn least_of(f: &impl Fn(f64) -> Option<f64>, starts: &[f64], [low, high]: [f64; 2]) -> Option<(f64, f64)> {
-    let mut points = Vec::with_capacity(starts.len() + WIDENED);
-    for &start in starts {
-        points.push((start, f(start)?));
-    }
+    let at = |value: f64| Some((value, f(value)?));
+    let mut points: Vec<(f64, f64)> = starts.iter().map(|start| at(*start)).collect::<Option<_>>()?;
     let least =
         |points: &[(f64, f64)]| (0..points.len()).min_by(|a, b| points[*a].1.total_cmp(&points[*b].1));
     for _ in 0..WIDENED {
@@ -589,10 +590,8 @@ fn least_of(f: &impl Fn(f64) -> Option<f64>, starts: &[f64], [low, high]: [f64; 
         let [first, last] = [points[0].0, points[points.len() - 1].0];
         let width = 0.5 * (last - first);
         match least(&points)? {
-            0 if first > low => points.insert(0, ((first - width).max(low), f((first - width).max(low))?)),
-            i if i + 1 == points.len() && last < high => {
-                points.push(((last + width).min(high), f((last + width).min(high))?));
-            }
+            0 if first > low => points.insert(0, at((first - width).max(low))?),
+            i if i + 1 == points.len() && last < high => points.push(at((last + width).min(high))?),
             _ => break,
         }
     }

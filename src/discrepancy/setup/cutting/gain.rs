@@ -25,6 +25,8 @@ const CERTAIN: f64 = 0.1;
 const ALIKE: f64 = 0.1;
 /// A channel with less of its force than this has none of it.
 const NONE_OF_IT: f64 = 0.03;
+/// What a channel in kN shows of its force among others in N.
+const KILO: f64 = 1e-3;
 /// Mistakes looked at further.
 const MOST: usize = 3;
 
@@ -73,6 +75,14 @@ impl OtherGain {
             cut.channels.iter().any(Option::is_some).then_some(())?;
         }
         Some(own)
+    }
+
+    /// The records as they can be used: with the gain that they look like, or without the channel that is dead.
+    pub(super) fn mended(&self, data: &CuttingData) -> Option<CuttingData> {
+        match self.is_dead {
+            true => self.left_out(data),
+            false => Some(self.undone(data, 1.0)),
+        }
     }
 
     /// `value`, `std`: logarithm of what the gain is over [`OtherGain::factor`].
@@ -130,9 +140,9 @@ fn looks_like(factor: f64) -> &'static str {
     let is = |of: f64| (factor.abs() / of).ln().abs() < DEVIATES;
     if is_turned_round(factor) {
         "as if a plug, the polarity or an axis were turned round between the cuts"
-    } else if is(1e-3) {
+    } else if is(KILO) {
         "as if these files were in kN and the others in N"
-    } else if is(1e3) {
+    } else if is(1.0 / KILO) {
         "as if these files were in N and the others in kN"
     } else if is(NEWTONS_PER_POUND) || is(1.0 / NEWTONS_PER_POUND) {
         "as if pounds-force and newtons were mixed"
@@ -230,7 +240,7 @@ fn is_alike(a: f64, b: f64) -> bool {
 }
 
 /// Cuts that stand far from the rest, by what is alike of them.
-fn single_cuts(robust: &RobustFit) -> Option<Vec<OtherGain>> {
+fn single_cuts(data: &CuttingData, robust: &RobustFit) -> Option<Vec<OtherGain>> {
     // With noise alike in all channels none of them alone decides on the phase of a cut.
     let gains = gains(&robust.even, &robust.theta)?;
     let usual: [(f64, f64); 4] = std::array::from_fn(|i| {
@@ -253,6 +263,15 @@ fn single_cuts(robust: &RobustFit) -> Option<Vec<OtherGain>> {
         }
     }
     found.retain(|f| 2 * f.cuts.len() < gains.len());
+    // Nothing of the force by the noise of the other cuts; but where the noise is as small, it is all there in another unit.
+    let own = self::gains(data, &robust.theta)?;
+    for one in found.iter_mut().filter(|f| f.is_dead) {
+        let seen = |i: &usize| one.channel.and_then(|channel| own[*i][channel]);
+        let is_kilo = |(gain, std): (f64, f64)| (gain / KILO - 1.0).abs() < DEVIATES && gain > BEYOND * std;
+        if one.cuts.iter().all(|i| seen(i).is_some_and(is_kilo)) {
+            (one.is_dead, one.factor) = (false, KILO);
+        }
+    }
     found.sort_by_key(|f| std::cmp::Reverse(f.cuts.len()));
     found.truncate(MOST);
     Some(found)
@@ -297,7 +316,9 @@ pub(super) fn other_gains(
     robust: Option<&RobustFit>,
     far_off: &[usize],
 ) -> Vec<OtherGain> {
-    let mut found = robust.and_then(single_cuts).unwrap_or_default();
+    let mut found = robust
+        .and_then(|robust| single_cuts(data, robust))
+        .unwrap_or_default();
     for &cut in far_off {
         found.extend(turned_round(data, &[cut]));
     }
@@ -328,7 +349,7 @@ mod tests {
     fn some_records_with_another_gain_are_named_with_it() {
         let made = ten_hard_cuts();
         assert_eq!(examine_cutting(&made, || None).unwrap().findings, []);
-        let all: [(&[usize], Option<usize>, f64, &str); 7] = [
+        let all: [(&[usize], Option<usize>, f64, &str); 8] = [
             (&[3], None, 0.01, "channel-gain"),
             (&[2, 6], None, 1e-3, "channel-gain"),
             (&[5, 6, 7, 8, 9], None, 0.5, "channel-gain"),
@@ -336,6 +357,7 @@ mod tests {
             (&[6], Some(1), -1.0, "channel-sign"),
             (&[1], Some(0), 1.0 / 4.448_221_615, "channel-gain"),
             (&[0, 7], Some(1), 1.2, "channel-gain"),
+            (&[5], Some(1), 1e-3, "channel-gain"),
         ];
         for (cuts, channel, factor, kind) in all {
             let other = OtherGain {

@@ -153,17 +153,15 @@ fn examine(data: &CuttingData, rival: impl FnOnce() -> Option<Rival>) -> Result<
     let base = model.and_then(|model| calibrate_cutting(&model, data));
     let found = [milling_direction(data, base.as_ref().ok()), dyno_axes(data)?];
     let least = found.into_iter().flatten().min_by(|a, b| a.1.total_cmp(&b.1));
-    // A channel without its gain in some cuts looks like another reading as well, which leaves more.
-    let least = match least {
-        Some((_, left)) if left >= SUSPICIOUS && a_gain_leaves_less(data, left)? => None,
+    let told = match least {
+        // A channel without its gain, or another one in its place, in some cuts looks like another reading of all as well, which leaves more.
+        Some((finding, left)) if left >= SUSPICIOUS => match OddCuts::of(data)? {
+            Some(odd) if odd.a_gain_leaves_less(data, left) => None,
+            odd => odd.and_then(|odd| odd.axes(data, left)).or(Some((finding, left))),
+        },
         least => least,
     };
-    if let Some((finding, left)) = least {
-        // Channels in another order in some cuts look like another reading of some or all, which leaves more.
-        let (finding, left) = match left < SUSPICIOUS {
-            true => (finding, left),
-            false => axes_of_some_cuts(data, left)?.unwrap_or((finding, left)),
-        };
+    if let Some((finding, left)) = told {
         check.explained_share = 1.0;
         check.reduced_chi2 = left;
         check.findings.push(finding);
@@ -197,45 +195,53 @@ fn leaves_more_than_noise(base: &Calibration, data: &CuttingData) -> bool {
     base.reduced_chi2 >= SUSPICIOUS.min(1.0 + 30.0 / data.value_count() as f64)
 }
 
-/// Whether another gain of some cuts leaves much less than `left`.
-fn a_gain_leaves_less(data: &CuttingData, left: f64) -> Result<bool> {
-    if data.cuts.len() < FEWEST_CUTS {
-        return Ok(false);
-    }
-    let robust = RobustFit::of(data);
-    let far_off = far_off(robust.as_ref())?;
-    let leaves_less = |gain: &OtherGain| {
-        let right = match gain.is_dead {
-            true => gain.left_out(data),
-            false => Some(gain.undone(data, 1.0)),
-        };
-        let own = right.and_then(|data| fit(&data));
-        own.is_some_and(|own| own.reduced_chi2 < MUCH_BETTER * left)
-    };
-    Ok(other_gains(data, robust.as_ref(), &far_off)
-        .iter()
-        .any(leaves_less))
+/// The cuts that stand apart from the others, where there are enough to tell.
+struct OddCuts {
+    robust: Option<RobustFit>,
+    /// Those that stand farthest from that fit, by index into the data's.
+    far_off: Vec<usize>,
 }
 
-/// Channels in another order in some cuts, where that leaves much less than `left`; with what it leaves.
-fn axes_of_some_cuts(data: &CuttingData, left: f64) -> Result<Option<(SetupFinding, f64)>> {
-    if data.cuts.len() < FEWEST_CUTS {
-        return Ok(None);
+impl OddCuts {
+    fn of(data: &CuttingData) -> Result<Option<Self>> {
+        if data.cuts.len() < FEWEST_CUTS {
+            return Ok(None);
+        }
+        let robust = RobustFit::of(data);
+        let far_off = match &robust {
+            Some(fit) => worst_cuts(&fit.even, &fit.theta, (0..fit.even.cuts.len()).collect())?,
+            None => Vec::new(),
+        };
+        Ok(Some(OddCuts { robust, far_off }))
     }
-    let robust = RobustFit::of(data);
-    let far_off = far_off(robust.as_ref())?;
-    let tried = other_axes(data, robust.as_ref(), &far_off)
-        .into_iter()
-        .filter_map(|axes| {
-            let left = fit(&axes.undone(data))?.reduced_chi2;
-            let finding = SetupFinding {
-                confidence: CERTAIN,
-                ..axes.finding(data)
-            };
-            Some((finding, left))
-        });
-    let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
-    Ok(best.filter(|(_, own)| *own < MUCH_BETTER * left))
+
+    fn gains(&self, data: &CuttingData) -> Vec<OtherGain> {
+        other_gains(data, self.robust.as_ref(), &self.far_off)
+    }
+
+    /// Whether another gain of some cuts leaves much less than `left`.
+    fn a_gain_leaves_less(&self, data: &CuttingData, left: f64) -> bool {
+        self.gains(data).iter().any(|gain| {
+            let own = gain.mended(data).and_then(|data| fit(&data));
+            own.is_some_and(|own| own.reduced_chi2 < MUCH_BETTER * left)
+        })
+    }
+
+    /// Channels in another order in some cuts, where that leaves much less than `left`; with what it leaves.
+    fn axes(&self, data: &CuttingData, left: f64) -> Option<(SetupFinding, f64)> {
+        let tried = other_axes(data, self.robust.as_ref(), &self.far_off)
+            .into_iter()
+            .filter_map(|axes| {
+                let left = fit(&axes.undone(data))?.reduced_chi2;
+                let finding = SetupFinding {
+                    confidence: CERTAIN,
+                    ..axes.finding(data)
+                };
+                Some((finding, left))
+            });
+        let best = tried.min_by(|a, b| a.1.total_cmp(&b.1));
+        best.filter(|(_, own)| *own < MUCH_BETTER * left)
+    }
 }
 
 /// Adds what `changes` explain of the misfit that the fitted model (`base`) has.
@@ -378,30 +384,21 @@ fn drilling_signs(calibration: &Calibration) -> Vec<SetupFinding> {
     turned.collect()
 }
 
-/// The cuts that stand farthest from a fit that they do not lead astray.
-fn far_off(robust: Option<&RobustFit>) -> Result<Vec<usize>> {
-    robust.map_or(Ok(Vec::new()), |robust| {
-        worst_cuts(&robust.even, &robust.theta, (0..robust.even.cuts.len()).collect())
-    })
-}
-
 /// What may be wrong with single cuts, or with some of them together: feed, depth or width, exchanged files, another gain.
 fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChange>> {
-    if data.cuts.len() < FEWEST_CUTS {
+    let Some(odd) = OddCuts::of(data)? else {
         return Ok(Vec::new());
-    }
-    let robust = RobustFit::of(data);
+    };
     let mut doubtful = worst_cuts(data, &base.theta, (0..data.cuts.len()).collect())?;
-    let far_off = far_off(robust.as_ref())?;
+    let far_off = &odd.far_off;
     let mut changes: Vec<RecordChange> = Vec::new();
     for (n, &a) in far_off.iter().enumerate() {
         let others = far_off[n + 1..].iter();
         let may_be_exchanged = others.filter(|&&b| data.cuts[a].may_be_exchanged_with(&data.cuts[b]));
         changes.extend(may_be_exchanged.map(|&b| RecordChange::Exchanged([a.min(b), a.max(b)])));
     }
-    let gains = other_gains(data, robust.as_ref(), &far_off);
     if data.process == Process::Milling {
-        let axes = other_axes(data, robust.as_ref(), &far_off);
+        let axes = other_axes(data, odd.robust.as_ref(), far_off);
         changes.extend(axes.into_iter().map(RecordChange::Axes));
     }
     doubtful.extend(far_off);
@@ -417,7 +414,7 @@ fn of_some_cuts(data: &CuttingData, base: &Calibration) -> Result<Vec<RecordChan
             Process::Turning => {}
         }
     }
-    changes.extend(gains.into_iter().map(RecordChange::Gain));
+    changes.extend(odd.gains(data).into_iter().map(RecordChange::Gain));
     Ok(changes)
 }
 

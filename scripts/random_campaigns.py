@@ -135,7 +135,8 @@ def simulated(options, seed, folder):
         what = ["--effect", effect, "--kind", KINDS[turn // len(options.effect) % len(KINDS)]]
         if options.drawn_sigmas:
             draw = random.Random(f"sigmas {seed}")
-            what += ["--visibility", f"{math.exp(draw.uniform(*map(math.log, VISIBILITY_SIGMAS))):.3g}"]
+            sigmas = math.exp(draw.uniform(*map(math.log, VISIBILITY_SIGMAS)))
+            what += ["--visibility", f"{sigmas:.3g}", "--possible"]
         if effect.startswith("amplitude"):
             what += ["--force-levels", "200,50"]
     written = lobestone(options.simulate_with or options.lobestone, "simulate", "--out", name, "--seed", str(seed), *spacing, *what)

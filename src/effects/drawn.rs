@@ -349,9 +349,10 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
         DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => [1e2, 1e3, 1e5].map(|h| vec![h]).to_vec(),
         DrawnForm::LossFactor => scale.iter().map(|k| vec![*k, 0.1]).collect(),
         DrawnForm::Maxwell => scale.iter().map(|k| vec![*k, 1e-2 * k]).collect(),
-        DrawnForm::RotorOnSpring => scale
+        // Rotors count with the square of the gear ratio; a servo damps them well.
+        DrawnForm::RotorOnSpring => [3e5, 1.5e6]
             .iter()
-            .flat_map(|k| [5.0, 60.0].map(|inertia| vec![*k, 1e-3 * k, inertia]))
+            .flat_map(|k| [60.0, 250.0].map(|inertia| vec![*k, 1e-2 * k, inertia]))
             .collect(),
         DrawnForm::FloorMode => [12.0, 18.0, 27.0, 40.0]
             .map(|frequency_hz| vec![2e3, frequency_hz, 0.03, 0.0, 0.0])

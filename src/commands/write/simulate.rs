@@ -50,7 +50,7 @@ pub struct SimulateArgs {
         value_name = "TIER",
         num_args = 0..=1,
         default_missing_value = "mixed",
-        conflicts_with_all = ["kind", "effects", "unknown", "strength", "visibility", "noise", "noise_floor", "postures",
+        conflicts_with_all = ["kind", "effects", "unknown", "strength", "visibility", "possible", "noise", "noise_floor", "postures",
             "spread_deg", "points", "band", "format", "quantity", "mass_error", "stiffness_error", "force_levels", "robot",
             "share", "laboratory", "line_noise", "common_noise"]
     )]
@@ -60,7 +60,7 @@ pub struct SimulateArgs {
     kind: CampaignKind,
     /// Force records of milled cuts instead of FRFs; an --effect on cutting forces says that, too. Of the other options only --out,
     /// --truth, --seed, --effect, --strength and --noise-n count.
-    #[arg(long, conflicts_with_all = ["unknown", "visibility", "noise", "noise_floor", "postures", "spread_deg", "points", "band",
+    #[arg(long, conflicts_with_all = ["unknown", "visibility", "possible", "noise", "noise_floor", "postures", "spread_deg", "points", "band",
         "format", "quantity", "mass_error", "stiffness_error", "force_levels", "laboratory", "line_noise", "common_noise", "random"])]
     milling: bool,
     /// Noise of each channel of force records, N; drawn where it is left out.
@@ -97,6 +97,10 @@ pub struct SimulateArgs {
     /// was refitted (5: barely visible; 50: clear; 500: plain).
     #[arg(long, value_name = "SIGMAS", conflicts_with = "strength")]
     visibility: Option<f64>,
+    /// With --visibility: keep to possible sizes, however faint the effect should be (else links a hundred times as stiff as steel may
+    /// be hidden, which `diagnose` names no link flexibility).
+    #[arg(long, requires = "visibility")]
+    possible: bool,
     /// Noise as a share of the response (0.02: 2 %); 0 also takes the constant part away.
     #[arg(long, value_name = "SHARE")]
     noise: Option<f64>,
@@ -222,6 +226,7 @@ fn scenario(args: &SimulateArgs) -> Result<StructureScenario> {
     scenario.common_noise = args.common_noise.unwrap_or_default();
     scenario.strength = args.strength;
     scenario.visibility_sigmas = args.visibility;
+    scenario.possible_only = args.possible;
     scenario.force_levels_n = args.force_levels.clone();
     scenario.noise_floor_m_per_n = match (args.noise_floor, args.noise) {
         (Some(floor), _) => floor,

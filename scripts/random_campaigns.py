@@ -390,17 +390,23 @@ def report(rows, options):
     wrong = [[r["seed"], r["kind"], " + ".join([label(r["hidden"] or r["truth"], r["site"]), *r["also"].split()]), r["sigmas"],
               label(r["said"], r["said_site"]), r["confidence"], r["outcome"]]
              for r in rows if not is_right(r)]
+    tier, how = f"--tier {options.tier}", (
+        f"`lobestone simulate --random {options.tier}` draws kind, postures, robot, noise, what is hidden and how plainly\n"
+        "it shows")
+    if options.effect:
+        sizes = "how plainly it shows is drawn" if options.drawn_sigmas else "at its usual sizes"
+        tier = " \\\n  ".join(f"--effect {effect}" for effect in options.effect) + " --drawn-sigmas" * options.drawn_sigmas
+        how = f"`lobestone simulate --effect` hides one effect after the other, {sizes};\nrobot, postures and noise are drawn"
     return f"""# Diagnosis of random campaigns
 
 Made by
 
 ```sh
-python3 scripts/random_campaigns.py --tier {options.tier} --count {options.count} --first-seed {options.first_seed}{spacing}
+python3 scripts/random_campaigns.py {tier} --count {options.count} --first-seed {options.first_seed}{spacing}
 ```
 
 {count} campaigns, seeds {options.first_seed} to {options.first_seed + options.count - 1}; one row a campaign in
-[{name}]({name}). `lobestone simulate --random {options.tier}` draws kind, postures, robot, noise, what is hidden and how plainly
-it shows; `lobestone diagnose` sees the folder only. Library effects are made with the model that is fitted to them. Intervals are 95 % (Wilson).
+[{name}]({name}). {how}; `lobestone diagnose` sees the folder only. Library effects are made with the model that is fitted to them. Intervals are 95 % (Wilson).
 
 {markdown(["", ""], figures)}
 Processor time of `diagnose`: median {statistics.median(seconds):.1f} s, longest {max(seconds):.1f} s.

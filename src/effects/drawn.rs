@@ -349,11 +349,15 @@ fn starts(site: Site, variant: usize, data: &DataSummary, peaks_hz: &[f64]) -> V
         DrawnForm::LossFactor if matches!(spot, Spot::Joint(_)) => [1e2, 1e3, 1e5].map(|h| vec![h]).to_vec(),
         DrawnForm::LossFactor => scale.iter().map(|k| vec![*k, 0.1]).collect(),
         DrawnForm::Maxwell => scale.iter().map(|k| vec![*k, 1e-2 * k]).collect(),
-        // Rotors count with the square of the gear ratio; a servo damps them well.
-        DrawnForm::RotorOnSpring => [3e5, 1.5e6]
-            .iter()
-            .flat_map(|k| [60.0, 250.0].map(|inertia| vec![*k, 1e-2 * k, inertia]))
-            .collect(),
+        // Rotors count with the square of the gear ratio; a servo damps most of them well.
+        DrawnForm::RotorOnSpring => [
+            (3e5, 1e-2, 60.0),
+            (1.5e6, 1e-2, 250.0),
+            (1e6, 1e-3, 60.0),
+            (1e6, 1e-3, 5.0),
+        ]
+        .map(|(stiffness, damping, inertia)| vec![stiffness, damping * stiffness, inertia])
+        .to_vec(),
         DrawnForm::FloorMode => [12.0, 18.0, 27.0, 40.0]
             .map(|frequency_hz| vec![2e3, frequency_hz, 0.03, 0.0, 0.0])
             .to_vec(),

@@ -249,6 +249,8 @@ const ROUGH: Stopping = Stopping {
 const LOOK_ITERATIONS: usize = 10;
 /// Times the lowest misfit from which on a starting point is given up after the look.
 const HOPELESS: f64 = 1.5;
+/// Share of the misfit that an optimum leaves at most where the one before it was a trap.
+const TRAPPED: f64 = 0.9;
 
 /// The likelihood from a point that is in the right basin already: log magnitudes could only lead out of it.
 fn resume(model: &StructureModel, sketch: &FrfData, start: &[f64], rough: Stopping) -> Result<(Fit, usize)> {
@@ -465,14 +467,16 @@ fn lowest(mut points: Vec<(f64, Start)>) -> Vec<Start> {
     points.into_iter().map(|(_, point)| point).collect()
 }
 
-/// Short fits from `points`, and to their end those that are not left far behind, `first` among them; best first.
+/// Short fits from `points`, and to their end those that are not left far behind, `first` among them; best first. Those that begin at a
+/// point of the likelihood's own count only where they lead out of a trap: most lead back or next to `first`, and between optima about as
+/// good those found from afar decide.
 fn race(model: &StructureModel, sketch: &FrfData, points: &[Start], first: Fit) -> Vec<Fit> {
     let progress = Progress::new("calibrating from further starting points", points.len());
     let look = Stopping {
         max_iterations: LOOK_ITERATIONS,
         ..ROUGH
     };
-    let looks: Vec<Fit> = points
+    let looks: Vec<(Misfit, Fit)> = points
         .par_iter()
         .filter_map(|start| {
             let fit = match start.by {
@@ -480,15 +484,18 @@ fn race(model: &StructureModel, sketch: &FrfData, points: &[Start], first: Fit) 
                 Misfit::Complex => resume(model, sketch, &start.theta, look),
             };
             progress.step();
-            fit.ok().map(|(fit, _)| fit)
+            fit.ok().map(|(fit, _)| (start.by, fit))
         })
         .collect();
     // Starts that a look leaves far behind the others would only end in another optimum.
-    let lowest = looks.iter().map(|f| f.cost).fold(first.cost, f64::min);
+    let lowest = looks.iter().map(|(_, f)| f.cost).fold(first.cost, f64::min);
     let mut fits: Vec<Fit> = looks
         .par_iter()
-        .filter(|look| look.cost < HOPELESS * lowest)
-        .filter_map(|look| resume(model, sketch, &look.theta, ROUGH).ok().map(|(fit, _)| fit))
+        .filter(|(_, look)| look.cost < HOPELESS * lowest)
+        .filter_map(|(by, look)| {
+            let (fit, _) = resume(model, sketch, &look.theta, ROUGH).ok()?;
+            (*by == Misfit::LogMagnitude || fit.cost < TRAPPED * first.cost).then_some(fit)
+        })
         .collect();
     fits.push(first);
     fits.sort_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -64,12 +64,7 @@ def main():
     arguments.add_argument("--report", type=pathlib.Path, help="default: reports/diagnosis_TIER.md")
     arguments.add_argument("--keep", type=pathlib.Path, help="keep the campaigns in this folder")
     options = arguments.parse_args()
-    if options.report is None:
-        name = "confusion" if options.tier == "mixed" else options.tier
-        if options.effect:
-            name = "effects"
-        parts = ["diagnosis", name, "loops" if options.loops else ""]
-        options.report = ROOT / "reports" / ("_".join(p for p in parts if p) + ".md")
+    options.report = options.report or default_report(options)
     table = options.report.with_suffix(".csv")
     seeds = range(options.first_seed, options.first_seed + options.count)
     rows = [r for r in known(table) if int(r["seed"]) in seeds]
@@ -91,6 +86,14 @@ def main():
     temporary.replace(options.report)
     picture(rows, options.report.with_suffix(".png"))
     print(f"wrote {options.report} and {table}")
+
+
+def default_report(options):
+    name = "confusion" if options.tier == "mixed" else options.tier
+    if options.effect:
+        name = "effects"
+    parts = ["diagnosis", name, "loops" if options.loops else ""]
+    return ROOT / "reports" / ("_".join(p for p in parts if p) + ".md")
 
 
 def known(table):
@@ -390,19 +393,21 @@ def report(rows, options):
     wrong = [[r["seed"], r["kind"], " + ".join([label(r["hidden"] or r["truth"], r["site"]), *r["also"].split()]), r["sigmas"],
               label(r["said"], r["said_site"]), r["confidence"], r["outcome"]]
              for r in rows if not is_right(r)]
-    tier, how = f"--tier {options.tier}", (
-        f"`lobestone simulate --random {options.tier}` draws kind, postures, robot, noise, what is hidden and how plainly\n"
-        "it shows")
     if options.effect:
+        hidden = " \\\n  ".join(f"--effect {effect}" for effect in options.effect) + " --drawn-sigmas" * options.drawn_sigmas
         sizes = "how plainly it shows is drawn" if options.drawn_sigmas else "at its usual sizes"
-        tier = " \\\n  ".join(f"--effect {effect}" for effect in options.effect) + " --drawn-sigmas" * options.drawn_sigmas
         how = f"`lobestone simulate --effect` hides one effect after the other, {sizes};\nrobot, postures and noise are drawn"
+    else:
+        hidden = f"--tier {options.tier}"
+        how = (f"`lobestone simulate --random {options.tier}` draws kind, postures, robot, noise, what is hidden and how plainly\n"
+               "it shows")
+    written = "" if options.report == default_report(options) else f" \\\n  --report reports/{options.report.name}"
     return f"""# Diagnosis of random campaigns
 
 Made by
 
 ```sh
-python3 scripts/random_campaigns.py {tier} --count {options.count} --first-seed {options.first_seed}{spacing}
+python3 scripts/random_campaigns.py {hidden} --count {options.count} --first-seed {options.first_seed}{spacing}{written}
 ```
 
 {count} campaigns, seeds {options.first_seed} to {options.first_seed + options.count - 1}; one row a campaign in

@@ -97,8 +97,8 @@ pub struct SimulateArgs {
     /// was refitted (5: barely visible; 50: clear; 500: plain).
     #[arg(long, value_name = "SIGMAS", conflicts_with = "strength")]
     visibility: Option<f64>,
-    /// With --visibility: keep to possible sizes, however faint the effect should be (else links a hundred times as stiff as steel may
-    /// be hidden, which `diagnose` names no link flexibility).
+    /// With --visibility: keep to possible sizes, however faint the effect should be (otherwise links a hundred times as stiff as steel
+    /// may be hidden, which `diagnose` rightly does not call flexible).
     #[arg(long, requires = "visibility")]
     possible: bool,
     /// Noise as a share of the response (0.02: 2 %); 0 also takes the constant part away.

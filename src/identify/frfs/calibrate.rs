@@ -374,30 +374,6 @@ impl Start {
     }
 }
 
-/// Where a scan of `moved` by `offsets` from `theta` has its local minima, with their costs, other than the one in the middle.
-fn valleys(problem: &FrfProblem<'_>, theta: &[f64], moved: &[usize], offsets: &[f64]) -> Vec<(f64, Start)> {
-    let bounds = problem.model.bounds();
-    let points: Vec<(f64, Start)> = offsets
-        .par_iter()
-        .map(|offset| {
-            stop::point();
-            let mut point = theta.to_vec();
-            for &i in moved {
-                point[i] = (point[i] + offset).clamp(bounds[i][0], bounds[i][1]);
-            }
-            let cost = problem.cost(&point).unwrap_or(f64::INFINITY);
-            let by = problem.misfit;
-            (cost, Start { theta: point, by })
-        })
-        .collect();
-    let cost = |i: usize| points[i].0;
-    (0..points.len())
-        .filter(|&i| offsets[i] != 0.0)
-        .filter(|&i| (i == 0 || cost(i) < cost(i - 1)) && (i + 1 == points.len() || cost(i) <= cost(i + 1)))
-        .map(|i| points[i].clone())
-        .collect()
-}
-
 /// A look at few of the data along lines through the parameters: where further starting points promise most.
 struct Scan<'a> {
     model: &'a StructureModel,
@@ -407,6 +383,8 @@ struct Scan<'a> {
 }
 
 impl Scan<'_> {
+    /// Where a scan of `moved`, so many steps to either side of `theta`, has its local minima, with their costs, other than the one in
+    /// the middle.
     fn valleys(
         &self,
         by: Misfit,
@@ -414,12 +392,32 @@ impl Scan<'_> {
         moved: &[usize],
         (count, step): (i32, f64),
     ) -> Vec<(f64, Start)> {
-        let offsets: Vec<f64> = (-count..=count).map(|k| f64::from(k) * step).collect();
         let data = match by {
             Misfit::LogMagnitude => &self.glance,
             Misfit::Complex => self.sketch,
         };
-        valleys(&problem(self.model, data, by), theta, moved, &offsets)
+        let (problem, bounds) = (problem(self.model, data, by), self.model.bounds());
+        let offsets: Vec<f64> = (-count..=count).map(|k| f64::from(k) * step).collect();
+        let points: Vec<(f64, Start)> = offsets
+            .par_iter()
+            .map(|offset| {
+                stop::point();
+                let mut theta = theta.to_vec();
+                for &i in moved {
+                    theta[i] = (theta[i] + offset).clamp(bounds[i][0], bounds[i][1]);
+                }
+                let cost = problem.cost(&theta).unwrap_or(f64::INFINITY);
+                (cost, Start { theta, by })
+            })
+            .collect();
+        let cost = |i: usize| points[i].0;
+        (0..points.len())
+            .filter(|&i| offsets[i] != 0.0)
+            .filter(|&i| {
+                (i == 0 || cost(i) < cost(i - 1)) && (i + 1 == points.len() || cost(i) <= cost(i + 1))
+            })
+            .map(|i| points[i].clone())
+            .collect()
     }
 
     /// All joints stiffer or softer by one factor than the robot file says.
@@ -443,19 +441,22 @@ impl Scan<'_> {
     /// Single joints away from where `found`, on the sketch, has them. By log magnitudes from afar; by the likelihood those that are
     /// hardly determined there, for it has narrow valleys: a joint whose resonance has left the measured band comes back so.
     fn single_joints(&self, found: &Fit) -> Vec<Start> {
-        let along = |by: Misfit, steps: (i32, f64), joints: &[usize]| -> Vec<(f64, Start)> {
-            let valleys = |joint: &usize| self.valleys(by, &found.theta, &[*joint], steps);
-            joints.iter().flat_map(valleys).collect()
+        let along = |by, joint, steps| self.valleys(by, &found.theta, &[joint], steps);
+        let joints = 0..self.model.robot.joint_count();
+        let afar = joints
+            .clone()
+            .flat_map(|joint| along(Misfit::LogMagnitude, joint, (ONE_JOINT, ONE_JOINT_STEP)));
+        let is_loose = |joint: &usize| {
+            let rise = 0.5 * found.hessian[(*joint, *joint)] * ONE_JOINT_STEP.powi(2);
+            rise < (HOPELESS - 1.0) * found.cost
         };
-        let all: Vec<usize> = (0..self.model.robot.joint_count()).collect();
-        let rise = |joint: usize| 0.5 * found.hessian[(joint, joint)] * ONE_JOINT_STEP.powi(2);
-        let is_loose = |joint: &usize| rise(*joint) < (HOPELESS - 1.0) * found.cost;
-        let loose: Vec<usize> = all.iter().copied().filter(is_loose).collect();
         let narrow = (ONE_JOINT_NARROW, ONE_JOINT_NARROW_STEP);
-        let mut close = along(Misfit::Complex, narrow, &loose);
-        close.retain(|(cost, _)| *cost < HOPELESS * found.cost);
-        let mut starts = lowest(along(Misfit::LogMagnitude, (ONE_JOINT, ONE_JOINT_STEP), &all));
-        starts.extend(lowest(close));
+        let close = joints
+            .filter(is_loose)
+            .flat_map(|joint| along(Misfit::Complex, joint, narrow))
+            .filter(|(cost, _)| *cost < HOPELESS * found.cost);
+        let mut starts = lowest(afar.collect());
+        starts.extend(lowest(close.collect()));
         starts
     }
 }

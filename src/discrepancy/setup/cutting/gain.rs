@@ -264,12 +264,15 @@ fn single_cuts(data: &CuttingData, robust: &RobustFit) -> Option<Vec<OtherGain>>
     }
     found.retain(|f| 2 * f.cuts.len() < gains.len());
     // Nothing of the force by the noise of the other cuts; but where the noise is as small, it is all there in another unit.
-    let own = self::gains(data, &robust.theta)?;
-    for one in found.iter_mut().filter(|f| f.is_dead) {
-        let seen = |i: &usize| one.channel.and_then(|channel| own[*i][channel]);
-        let is_kilo = |(gain, std): (f64, f64)| (gain / KILO - 1.0).abs() < DEVIATES && gain > BEYOND * std;
-        if one.cuts.iter().all(|i| seen(i).is_some_and(is_kilo)) {
-            (one.is_dead, one.factor) = (false, KILO);
+    if found.iter().any(|f| f.is_dead) {
+        let own = self::gains(data, &robust.theta)?;
+        for one in found.iter_mut().filter(|f| f.is_dead) {
+            let seen = |i: &usize| one.channel.and_then(|channel| own[*i][channel]);
+            let is_kilo =
+                |(gain, std): (f64, f64)| (gain / KILO - 1.0).abs() < DEVIATES && gain > BEYOND * std;
+            if one.cuts.iter().all(|i| seen(i).is_some_and(is_kilo)) {
+                (one.is_dead, one.factor) = (false, KILO);
+            }
         }
     }
     found.sort_by_key(|f| std::cmp::Reverse(f.cuts.len()));

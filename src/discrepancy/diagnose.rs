@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{BaselineFit, EffectCandidate, share_taken};
 use super::diagnosis::Diagnosis;
+use super::faint;
 use super::verdict::{self, DiagnosisVerdict, EffectSet};
 use crate::Result;
 use crate::effects::Site;
@@ -31,9 +32,6 @@ const REFINED: usize = 8;
 const BEHIND: f64 = 4.0;
 /// Misfit per degree of freedom of the baseline below which what is missing is faint.
 const FAINT: f64 = 1.5;
-/// Fall of χ² on the coarse view from which on a faint effect is looked for in all data. What means nothing and can only grow gains as
-/// much in one case of six.
-const HINT: f64 = 1.0;
 /// Times the baseline is fitted anew, and all candidates from it, where a candidate's fit leads to a better baseline.
 const REBASED: usize = 2;
 /// Share of its misfit by which a baseline must be better for that.
@@ -278,7 +276,7 @@ impl<'a, S: Study> Engine<'a, S> {
         }
 
         if base_reduced < FAINT {
-            self.begin_at_linear_sizes(&tried, &coarse_base, &base, &mut refined)?;
+            self.begin_at_linear_sizes(&base, &mut refined)?;
         }
         let (diagnosis, alone) = self.conclude((&coarse_base, &base), &tried, &refined)?;
         let Some(alone) = alone else { return Ok(diagnosis) };
@@ -626,6 +624,11 @@ impl<'a, S: Study> Engine<'a, S> {
     fn try_harder(&self, best: &mut TriedOf<S>, base_reduced: f64) -> Result<()> {
         let is_noise = |t: &TriedOf<S>| verdict::is_noise(self.reduced_chi2(t));
         if is_noise(best) {
+            // By its size; what many data leave may have structure all the same, and another choice would follow it.
+            let choices = self.other_choices(best).count();
+            if choices > 0 && self.study.rest(&best.model, &best.fit.theta)?.is_significant() {
+                self.try_other_choices(best)?;
+            }
             return Ok(());
         }
         if let Some(fit) = rescue(self.study, self.model, best, &self.hints, REFINE)? {
@@ -643,10 +646,19 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(())
     }
 
+    /// Those of the same effect and site that choose otherwise.
+    fn other_choices<'e>(&'e self, tried: &'e TriedOf<S>) -> impl Iterator<Item = &'e InstanceOf<S>> {
+        let label = self.label(&tried.instance);
+        self.instances
+            .iter()
+            .filter(move |other| **other != tried.instance && self.label(other) == label)
+    }
+
     /// Of the other choices of the effect in `best`, from what that has made of the model and of the sizes that both have: the one that is
     /// better by more than what its parameters cost.
     fn try_other_choices(&self, best: &mut TriedOf<S>) -> Result<()> {
-        let label = self.label(&best.instance);
+        // What it leaves tells where those of the others have resonances that it has not.
+        let hints = self.study.hints(&best.model, &best.fit.theta)?;
         let (front, sizes) = best.fit.theta.split_at(self.base_count);
         let common: Vec<(&str, f64)> = best.model.parameters[self.base_count..]
             .iter()
@@ -654,7 +666,7 @@ impl<'a, S: Study> Engine<'a, S> {
             .zip(sizes.iter().copied())
             .collect();
         let starts = |model: &ModelOf<S>, other: &InstanceOf<S>| -> Vec<Vec<f64>> {
-            let mut starts = own_starts(self.study, model, self.base_count, other, &self.hints);
+            let mut starts = own_starts(self.study, model, self.base_count, other, &hints);
             for start in &mut starts {
                 for (value, parameter) in start.iter_mut().zip(&model.parameters[self.base_count..]) {
                     let known = common.iter().find(|(name, _)| *name == parameter.name);
@@ -664,10 +676,9 @@ impl<'a, S: Study> Engine<'a, S> {
             starts.dedup();
             starts
         };
-        let others: Vec<TriedOf<S>> = self
-            .instances
-            .par_iter()
-            .filter(|other| **other != best.instance && self.label(other) == label)
+        let others: Vec<&InstanceOf<S>> = self.other_choices(best).collect();
+        let others: Vec<TriedOf<S>> = others
+            .into_par_iter()
             .filter_map(|other| {
                 let model = self.study.extend(self.model, other);
                 let fits = starts(&model, other).into_iter().filter_map(|own| {
@@ -739,35 +750,33 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(())
     }
 
-    /// Where little is missing: the coarse view may show too little of an effect to lead its fit away from where it vanishes, and all
-    /// data show it. Those that gain nothing on the coarse view but whose size it hints at are fitted from the size that all data give.
-    fn begin_at_linear_sizes(
-        &self,
-        tried: &[TriedOf<S>],
-        coarse_base: &Fit,
-        base: &Fit,
-        refined: &mut Vec<TriedOf<S>>,
-    ) -> Result<()> {
-        let hinted_at = |t: &TriedOf<S>| {
-            let coarse = self.study.problem(&t.model, View::COARSE);
-            linear_size(&coarse, &t.model, &coarse_base.theta).is_some_and(|size| size.gain > HINT)
+    /// Where little is missing: a look at few data may show too little of an effect to lead its fit away from where it vanishes, or to
+    /// promise anything, and all data show it. Those that gain more by the size that all data give than they did are fitted from there.
+    fn begin_at_linear_sizes(&self, base: &Fit, refined: &mut Vec<TriedOf<S>>) -> Result<()> {
+        let effects = (self.instances.as_slice(), self.hints.as_slice());
+        let gained = |label: &str| {
+            let known = refined.iter().filter(|r| self.label(&r.instance) == label);
+            known.map(|r| 2.0 * (base.cost - r.fit.cost)).fold(0.0, f64::max)
         };
-        let found: Vec<TriedOf<S>> = tried
-            .par_iter()
-            .filter(|t| 2.0 * (coarse_base.cost - t.fit.cost) < HINT && hinted_at(t))
-            .filter_map(|t| {
-                let problem = self.study.problem(&t.model, View::FULL);
-                let start = linear_size(&problem, &t.model, &base.theta)?.theta;
-                let known = refined.iter().find(|r| r.instance == t.instance);
-                let lowest = known.map_or(base.cost, |r| r.fit.cost.min(base.cost));
-                let promising = problem.cost(&start).is_ok_and(|cost| cost < lowest);
-                promising.then_some((t, start))
-            })
-            .map(|(t, start)| {
-                let fit = self.minimise(&t.model, View::FULL, &start, REFINE)?;
-                Ok(Tried { fit, ..t.clone() })
-            })
+        let starts = faint::starts(self.study, self.model, base, effects, gained)?;
+        let found: Vec<TriedOf<S>> = starts
+            .into_par_iter()
+            .map(
+                |faint::Start {
+                     instance,
+                     model,
+                     theta,
+                 }| {
+                    let fit = self.minimise(&model, View::FULL, &theta, REFINE)?;
+                    Ok(Tried { instance, model, fit })
+                },
+            )
             .collect::<Result<_>>()?;
+        refined.retain(|r| {
+            let label = self.label(&r.instance);
+            let better = |f: &TriedOf<S>| self.label(&f.instance) == label && f.fit.cost < r.fit.cost;
+            !found.iter().any(better)
+        });
         put_among(refined, found);
         Ok(())
     }

@@ -7,6 +7,7 @@ pub mod cutting_trends;
 pub mod diagnose;
 pub mod diagnosis;
 pub mod extension;
+mod faint;
 pub mod joint_trends;
 pub mod localise;
 pub mod outlook;

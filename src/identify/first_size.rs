@@ -27,6 +27,8 @@ fn own_parameters<D: Modelled>(model: &Model<D>, count: usize) -> &[Parameter] {
 pub struct LinearSize {
     /// All parameters at that size, solver's scale.
     pub theta: Vec<f64>,
+    /// Parameters of the effect where it hardly is there, in the shape from which it grew, solver's scale.
+    pub shape: Vec<f64>,
     /// By how much χ² would fall, values.
     pub gain: f64,
 }
@@ -38,9 +40,56 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
     model: &Model<D>,
     base: &[f64],
 ) -> Option<LinearSize> {
+    size_from(problem, model, base, &faintest(model)?)
+}
+
+/// As [`linear_size`], of the effect in each of the shapes that `own` has (values of its parameters, solver's scale): frequencies, places
+/// and the like mean nothing where it vanishes, and must be right for it to grow. The one by which χ² would fall most.
+pub fn linear_size_of_shapes<D: Modelled, P: LeastSquares>(
+    problem: &P,
+    model: &Model<D>,
+    base: &[f64],
+    own: &[Vec<f64>],
+) -> Option<LinearSize> {
     let faint = faintest(model)?;
+    let is_shape = shapes(model)?;
+    let mut points: Vec<Vec<f64>> = Vec::new();
+    for start in own {
+        let pick = |i: usize| if is_shape[i] { start[i] } else { faint[i] };
+        let point: Vec<f64> = (0..faint.len()).map(pick).collect();
+        if !points.contains(&point) {
+            points.push(point);
+        }
+    }
+    points
+        .iter()
+        .filter_map(|point| size_from(problem, model, base, point))
+        .max_by(|a, b| a.gain.total_cmp(&b.gain))
+}
+
+/// Whether each parameter of the effect added last is its shape, which stays where the effect vanishes; none is where all stay.
+fn shapes<D: Modelled>(model: &Model<D>) -> Option<Vec<bool>> {
+    let limit = model.vanishing_limit()?;
+    let own = own_parameters(model, limit.len());
+    let stays: Vec<bool> = own
+        .iter()
+        .zip(&limit)
+        .map(|(p, l)| p.internal(p.nominal) == *l)
+        .collect();
+    let all = stays.iter().all(|s| *s);
+    Some(stays.into_iter().map(|s| s && !all).collect())
+}
+
+/// `faint`: values of the parameters of the effect, next to where it vanishes.
+fn size_from<D: Modelled, P: LeastSquares>(
+    problem: &P,
+    model: &Model<D>,
+    base: &[f64],
+    faint: &[f64],
+) -> Option<LinearSize> {
     let own = own_parameters(model, faint.len());
-    let start = [base, faint.as_slice()].concat();
+    let is_shape = shapes(model)?;
+    let start = [base, faint].concat();
     let mut here = problem.linearise(&start).ok()?;
     for (i, parameter) in own.iter().enumerate().map(|(i, p)| (base.len() + i, p)) {
         if let Some(prior) = parameter.prior {
@@ -50,15 +99,21 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
         }
     }
     let step = here.newton_step()?;
+    // Towards the usual size the effect grows, in proportion to exp(±θ).
+    let towards = |i: usize| (own[i].internal(own[i].nominal) - faint[i]).signum();
+    let grows = |i: usize| own[i].scale == Scale::Logarithmic && !is_shape[i];
+    let growth = |i: usize| 1.0 + (towards(i) * step[base.len() + i]).max(0.0);
+    let all_growth: f64 = (0..own.len()).filter(|i| grows(*i)).map(growth).product();
     let mut size = start.clone();
     let mut asked_for = false;
     for (i, parameter) in model.parameters.iter().enumerate() {
         let [low, high] = parameter.internal_bounds();
         let away = match i.checked_sub(base.len()) {
-            Some(i) if own[i].scale == Scale::Logarithmic => {
-                // Towards the usual size the effect grows, in proportion to exp(±θ).
-                let towards = (own[i].internal(own[i].nominal) - faint[i]).signum();
-                towards * (towards * step[base.len() + i]).max(0.0).ln_1p()
+            Some(i) if grows(i) => towards(i) * growth(i).ln(),
+            // What a change of shape does is in proportion to the size that it is a change of.
+            Some(own) if is_shape[own] => {
+                let most = parameter.prior.map_or(1.0, |prior| prior.std);
+                (step[i] / all_growth).clamp(-most, most)
             }
             _ => step[i],
         };
@@ -67,7 +122,11 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
     }
     // The parameters in front stand at their best: what the step gains, the effect gains.
     let gain = -here.gradient.dot(&step);
-    (asked_for && size.iter().all(|t| t.is_finite())).then_some(LinearSize { theta: size, gain })
+    (asked_for && size.iter().all(|t| t.is_finite())).then(|| LinearSize {
+        theta: size,
+        shape: faint.to_vec(),
+        gain,
+    })
 }
 
 #[cfg(test)]

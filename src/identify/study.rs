@@ -19,6 +19,8 @@ pub enum Extent {
     Glance,
     /// A share of the data that shows every effect, for trying many starting points.
     Coarse,
+    /// A share of the lines of every FRF, for one look at what is faint: some FRFs alone may show it.
+    Thin,
     /// Everything.
     Full,
 }
@@ -53,6 +55,11 @@ impl View {
     /// Hardly more than shows the strong effects, by likelihood.
     pub const GLANCE: View = View {
         extent: Extent::Glance,
+        ..View::COARSE
+    };
+    /// A share of the lines of every FRF, by likelihood.
+    pub const THIN: View = View {
+        extent: Extent::Thin,
         ..View::COARSE
     };
     /// All data, by likelihood.

@@ -30,6 +30,7 @@ pub struct StructureStudy {
     measured: Option<Vec<f64>>,
     slips: Option<AbsorbSlips>,
     coarse: FrfData,
+    thin: FrfData,
     glance: FrfData,
     /// Postures that are left out in turn, and the data without each.
     postures: Vec<usize>,
@@ -43,6 +44,8 @@ pub struct StructureStudy {
 const LARGEST_STRIDE: usize = 6;
 /// Complex values the coarse view has, about: enough to tell effects apart, few enough to try many starts.
 const COARSE_VALUES: usize = 2500;
+/// Complex values the thin view has, about.
+const THIN_VALUES: usize = 15_000;
 
 impl StructureStudy {
     /// FRFs, with the thinner views that searches use.
@@ -59,6 +62,7 @@ impl StructureStudy {
         let every = share.div_ceil(share.min(largest)).clamp(1, 3);
         let stride = share.div_ceil(every).min(largest);
         let coarse = data.thinned(stride, every);
+        let thin = data.thinned(data.value_count().div_ceil(THIN_VALUES).min(largest), 1);
         let postures = data.measured_postures();
         let without = |data: &FrfData| -> Vec<FrfData> {
             postures.iter().map(|&p| data.filtered(|q| q != p)).collect()
@@ -70,6 +74,7 @@ impl StructureStudy {
             summary: data.summary(),
             registry: Registry::structure(),
             coarse,
+            thin,
             postures,
             data,
             options,
@@ -108,9 +113,10 @@ impl StructureStudy {
         match (view.extent, view.left_out) {
             (Extent::Glance, None) => &self.glance,
             (Extent::Coarse, None) => &self.coarse,
+            (Extent::Thin, None) => &self.thin,
             (Extent::Full, None) => &self.data,
             // A fold is too little to glance at.
-            (Extent::Glance | Extent::Coarse, Some(fold)) => &self.coarse_without[fold],
+            (Extent::Glance | Extent::Coarse | Extent::Thin, Some(fold)) => &self.coarse_without[fold],
             (Extent::Full, Some(fold)) => &self.full_without[fold],
         }
     }
@@ -370,7 +376,9 @@ pub fn residual_peaks(predicted: &[Vec<Complex64>], data: &FrfData) -> Vec<Resid
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::first_size::linear_size_of_shapes;
     use crate::identify::frfs::frf_problem::tests::{data, model};
+    use crate::identify::study::own_starts;
     use approx::assert_relative_eq;
 
     /// FRFs that are a tenth larger than the model's, known to 2 %: two postures of three FRFs of five lines.
@@ -406,5 +414,41 @@ mod tests {
         assert_relative_eq!(fold.chi2, 15.0 * 2.0 * (part / 0.02).powi(2), max_relative = 1e-9);
         // Errors of a hundredth are half of the noise.
         assert_relative_eq!(small_errors(&study.data), 30.0 * 2.0 * 0.25, max_relative = 1e-9);
+    }
+
+    /// A load of 0.5 kg off the flange's axis: next to nothing, its centre of mass means nothing, and one step from there gives both.
+    #[test]
+    fn one_step_finds_the_size_and_the_shape_of_a_faint_effect() {
+        let bare = model();
+        let mut data = data(&bare);
+        let load = Registry::structure().find(&bare.robot.spec, "payload-inertia")[0];
+        let loaded = bare.with_effect(load, &bare.known(&data.summary()));
+        let (count, sizes) = (bare.parameters.len(), [0.5, 0.14, 0.07, 0.12, 0.1]);
+        let own = loaded.parameters[count..]
+            .iter()
+            .zip(sizes)
+            .map(|(p, v)| p.internal(v));
+        let truth: Vec<f64> = bare.nominal_theta().into_iter().chain(own).collect();
+        let mut curves = loaded.predict(&truth, &data).unwrap().into_iter();
+        for block in &mut data.blocks {
+            for frf in &mut std::sync::Arc::make_mut(block).frfs {
+                frf.receptance = curves.next().unwrap();
+                frf.noise_std = frf.receptance.iter().map(|h| 1e-4 * h.norm()).collect();
+            }
+        }
+        let study = StructureStudy::new(data, Options::default());
+        let starts = own_starts(&study, &loaded, count, &load, &[]);
+        let problem = study.problem(&loaded, View::FULL);
+        let size = linear_size_of_shapes(&problem, &loaded, &bare.nominal_theta(), &starts).unwrap();
+        let found: Vec<f64> = (count..truth.len())
+            .map(|i| loaded.parameters[i].natural(size.theta[i]))
+            .collect();
+        assert!((found[0] / sizes[0] - 1.0).abs() < 0.1, "{found:?}");
+        for (found, true_m) in found[1..4].iter().zip(&sizes[1..4]) {
+            assert!((found - true_m).abs() < 0.03, "{found} for {true_m}");
+        }
+        // It grew from the end of its range next to nothing, in one of the shapes that it was given.
+        assert_eq!(size.shape[0], loaded.parameters[count].internal_bounds()[0]);
+        assert!(starts.iter().any(|start| start[1..] == size.shape[1..]));
     }
 }

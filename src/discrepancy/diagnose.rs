@@ -762,7 +762,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let found: Vec<TriedOf<S>> = starts
             .into_par_iter()
             .map(
-                |faint::Start {
+                |faint::FaintStart {
                      instance,
                      model,
                      theta,

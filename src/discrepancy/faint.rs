@@ -28,7 +28,7 @@ const REFIT: Stopping = Stopping {
 };
 
 /// Where the fit of an effect to all data begins.
-pub(super) struct Start<S: Study> {
+pub(super) struct FaintStart<S: Study> {
     pub(super) instance: InstanceOf<S>,
     /// With the effect.
     pub(super) model: ModelOf<S>,
@@ -38,7 +38,7 @@ pub(super) struct Start<S: Study> {
 
 /// An effect that gains.
 struct Hint<S: Study> {
-    start: Start<S>,
+    start: FaintStart<S>,
     /// Points for its own parameters next to where it vanishes.
     shapes: Vec<Vec<f64>>,
     /// By how much χ² would fall.
@@ -54,7 +54,7 @@ pub(super) fn starts<S: Study>(
     base: &Fit,
     (instances, hints): (&[InstanceOf<S>], &[f64]),
     gained: impl Fn(&str) -> f64 + Sync,
-) -> Result<Vec<Start<S>>> {
+) -> Result<Vec<FaintStart<S>>> {
     let count = model.parameters.len();
     let label = |hint: &Hint<S>| hint.start.instance.name().label();
     let without = minimise(
@@ -100,7 +100,7 @@ fn hint<S: Study>(
     let moved = size.theta[without.theta.len()..].to_vec();
     // More than there is is not to be had.
     (size.gain < 2.0 * without.cost).then_some(Hint {
-        start: Start {
+        start: FaintStart {
             instance,
             model,
             theta: size.theta,

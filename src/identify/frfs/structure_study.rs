@@ -433,7 +433,7 @@ mod tests {
         for block in &mut data.blocks {
             for frf in &mut std::sync::Arc::make_mut(block).frfs {
                 frf.receptance = curves.next().unwrap();
-                frf.noise_std = frf.receptance.iter().map(|h| 1e-4 * h.norm()).collect();
+                frf.noise_std = frf.receptance.iter().map(|h| 0.5 * h.norm()).collect();
             }
         }
         let study = StructureStudy::new(data, Options::default());

@@ -759,19 +759,20 @@ impl<'a, S: Study> Engine<'a, S> {
             known.map(|r| 2.0 * (base.cost - r.fit.cost)).fold(0.0, f64::max)
         };
         let starts = faint::starts(self.study, self.model, base, effects, gained)?;
+        // A size that no robot stands with is no start.
         let found: Vec<TriedOf<S>> = starts
             .into_par_iter()
-            .map(
-                |faint::FaintStart {
-                     instance,
-                     model,
-                     theta,
-                 }| {
-                    let fit = self.minimise(&model, View::FULL, &theta, REFINE)?;
-                    Ok(Tried { instance, model, fit })
-                },
-            )
-            .collect::<Result<_>>()?;
+            .filter_map(|start| {
+                let fit = self
+                    .minimise(&start.model, View::FULL, &start.theta, REFINE)
+                    .ok()?;
+                Some(Tried {
+                    instance: start.instance,
+                    model: start.model,
+                    fit,
+                })
+            })
+            .collect();
         refined.retain(|r| {
             let label = self.label(&r.instance);
             let better = |f: &TriedOf<S>| self.label(&f.instance) == label && f.fit.cost < r.fit.cost;

@@ -7,7 +7,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::{BaselineFit, EffectCandidate, share_taken};
 use super::diagnosis::Diagnosis;
-use super::faint;
+use super::faint::{self, Linear};
+use super::ranking::keep_first_of_each;
 use super::verdict::{self, DiagnosisVerdict, EffectSet};
 use crate::Result;
 use crate::effects::Site;
@@ -149,15 +150,6 @@ struct Together<S: Study> {
     possible: bool,
 }
 
-/// A further effect at the size that it would have were the response linear in it.
-struct Linear<S: Study> {
-    instance: InstanceOf<S>,
-    model: ModelOf<S>,
-    theta: Vec<f64>,
-    /// By how much χ² would fall on the coarse view.
-    gain: f64,
-}
-
 struct Engine<'a, S: Study> {
     study: &'a S,
     model: &'a ModelOf<S>,
@@ -208,6 +200,16 @@ impl<'a, S: Study> Engine<'a, S> {
     fn freedom(&self, model: &ModelOf<S>, extent: Extent) -> f64 {
         let values = self.study.real_values(extent) as f64;
         (values - model.parameters.len() as f64).max(1.0)
+    }
+
+    /// As [`put_among`]; another choice of the same effect that is worse than what was found goes.
+    fn put_choices_among(&self, refined: &mut Vec<TriedOf<S>>, found: Vec<TriedOf<S>>) {
+        refined.retain(|r| {
+            let label = self.label(&r.instance);
+            let better = |f: &TriedOf<S>| self.label(&f.instance) == label && f.fit.cost < r.fit.cost;
+            !found.iter().any(better)
+        });
+        put_among(refined, found);
     }
 
     fn reduced_chi2(&self, tried: &TriedOf<S>) -> f64 {
@@ -280,9 +282,7 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         let (diagnosis, alone) = self.conclude((&coarse_base, &base), &tried, &refined)?;
         let Some(alone) = alone else { return Ok(diagnosis) };
-        // One choice of each effect.
-        refined.retain(|t| self.label(&t.instance) != self.label(&alone.instance));
-        put_among(&mut refined, [alone]);
+        self.put_choices_among(&mut refined, vec![alone]);
         Ok(self.conclude((&coarse_base, &base), &tried, &refined)?.0)
     }
 
@@ -565,13 +565,7 @@ impl<'a, S: Study> Engine<'a, S> {
         let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
         let paid = |t: &TriedOf<S>| t.fit.cost + price * t.fit.theta.len() as f64;
         tried.sort_by(|a, b| paid(a).total_cmp(&paid(b)));
-        let mut labels = Vec::new();
-        tried.retain(|t| {
-            let label = self.label(&t.instance);
-            let new = !labels.contains(&label);
-            labels.push(label);
-            new
-        });
+        keep_first_of_each(&mut tried, |t| self.label(&t.instance));
         tried.sort_by(by_cost);
         let Some(best) = tried.first() else {
             return Ok((tried, None));
@@ -758,27 +752,15 @@ impl<'a, S: Study> Engine<'a, S> {
             let known = refined.iter().filter(|r| self.label(&r.instance) == label);
             known.map(|r| 2.0 * (base.cost - r.fit.cost)).fold(0.0, f64::max)
         };
-        let starts = faint::starts(self.study, self.model, base, effects, gained)?;
+        let sizes = faint::sizes(self.study, self.model, base, effects, gained)?;
         // A size that no robot stands with is no start.
-        let found: Vec<TriedOf<S>> = starts
+        let found: Vec<TriedOf<S>> = sizes
             .into_par_iter()
-            .filter_map(|start| {
-                let fit = self
-                    .minimise(&start.model, View::FULL, &start.theta, REFINE)
-                    .ok()?;
-                Some(Tried {
-                    instance: start.instance,
-                    model: start.model,
-                    fit,
-                })
+            .filter_map(|Linear { instance, size }| {
+                fit_from(self.study, self.model, &instance, &size.theta, View::FULL, REFINE).ok()
             })
             .collect();
-        refined.retain(|r| {
-            let label = self.label(&r.instance);
-            let better = |f: &TriedOf<S>| self.label(&f.instance) == label && f.fit.cost < r.fit.cost;
-            !found.iter().any(better)
-        });
-        put_among(refined, found);
+        self.put_choices_among(refined, found);
         Ok(())
     }
 
@@ -870,13 +852,10 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         pairs.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
         // Both leaders may have ended at the same two.
-        let mut known: Vec<Vec<String>> = Vec::new();
-        pairs.retain(|(pair, _)| {
-            let mut own = self.labels(&pair.parts);
-            own.sort();
-            let new = !known.contains(&own);
-            known.push(own);
-            new
+        keep_first_of_each(&mut pairs, |(pair, _)| {
+            let mut labels = self.labels(&pair.parts);
+            labels.sort();
+            labels
         });
         let plain = pairs.first().is_some_and(|(pair, _)| {
             let freedom = self.freedom(&pair.model, Extent::Full);
@@ -938,9 +917,8 @@ impl<'a, S: Study> Engine<'a, S> {
     fn by_linear_gain(&self, leader: &Together<S>) -> Vec<Linear<S>> {
         let study = self.study;
         let taken = self.labels(&leader.parts);
-        // More than there is is not to be had.
         let cost = study.problem(&leader.model, View::COARSE).cost(&leader.theta);
-        let most = 2.0 * cost.unwrap_or(f64::INFINITY);
+        let cost = cost.unwrap_or(f64::INFINITY);
         let mut gains: Vec<Linear<S>> = self
             .instances
             .par_iter()
@@ -948,15 +926,10 @@ impl<'a, S: Study> Engine<'a, S> {
             .filter_map(|instance| {
                 let model = study.extend(&leader.model, instance);
                 let size = linear_size(&study.problem(&model, View::COARSE), &model, &leader.theta)?;
-                (size.gain < most).then_some(Linear {
-                    instance: *instance,
-                    model,
-                    theta: size.theta,
-                    gain: size.gain,
-                })
+                Linear::new(*instance, size, cost)
             })
             .collect();
-        gains.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        gains.sort_by(|a, b| b.size.gain.total_cmp(&a.size.gain));
         gains
     }
 
@@ -1021,15 +994,9 @@ impl<'a, S: Study> Engine<'a, S> {
         let missed = missed.filter(|linear| tried.iter().all(|t| t.instance != linear.instance));
         let missed: Vec<TriedOf<S>> = missed
             .take(effort.linear)
-            .filter_map(|linear| {
-                let fit = self
-                    .minimise(&linear.model, View::COARSE, &linear.theta, REFIT_BRIEFLY)
-                    .ok()?;
-                Some(Tried {
-                    instance: linear.instance,
-                    model: linear.model,
-                    fit,
-                })
+            .filter_map(|Linear { instance, size }| {
+                let (view, briefly) = (View::COARSE, REFIT_BRIEFLY);
+                fit_from(study, &leader.model, &instance, &size.theta, view, briefly).ok()
             })
             .collect();
         tried.extend(missed);

@@ -6,9 +6,10 @@
 
 use rayon::prelude::*;
 
+use super::ranking::keep_first_of_each;
 use super::verdict::gain_by_chance;
 use crate::Result;
-use crate::identify::first_size::linear_size_of_shapes;
+use crate::identify::first_size::{LinearSize, linear_size_of_shapes};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::study::{InstanceOf, ModelOf, Study, View, own_starts};
 
@@ -27,97 +28,68 @@ const REFIT: Stopping = Stopping {
     relative_decrease: 1e-6,
 };
 
-/// Where the fit of an effect to all data begins.
-pub(super) struct FaintStart<S: Study> {
+/// An effect at the size that it would have were the response linear in it.
+pub(super) struct Linear<S: Study> {
     pub(super) instance: InstanceOf<S>,
-    /// With the effect.
-    pub(super) model: ModelOf<S>,
-    /// All parameters, solver's scale.
-    pub(super) theta: Vec<f64>,
+    pub(super) size: LinearSize,
 }
 
-/// An effect that gains.
-struct Hint<S: Study> {
-    start: FaintStart<S>,
-    /// Points for its own parameters next to where it vanishes.
-    shapes: Vec<Vec<f64>>,
-    /// By how much χ² would fall.
-    gain: f64,
+impl<S: Study> Linear<S> {
+    /// `cost`: that of the fit without the effect. `None` for a size that would take more away than there is.
+    pub(super) fn new(instance: InstanceOf<S>, size: LinearSize, cost: f64) -> Option<Self> {
+        (size.gain < 2.0 * cost).then_some(Linear { instance, size })
+    }
 }
 
 /// Where to begin the fits of those effects that would take more χ² away than chance and than they do already. `base`: the fit of
 /// `model` to all data; `instances`: all effects, each with all its discrete choices, and frequencies at which much is left; `gained`: by
 /// how much the effect of a label has made χ² fall so far.
-pub(super) fn starts<S: Study>(
+pub(super) fn sizes<S: Study>(
     study: &S,
     model: &ModelOf<S>,
     base: &Fit,
     (instances, hints): (&[InstanceOf<S>], &[f64]),
     gained: impl Fn(&str) -> f64 + Sync,
-) -> Result<Vec<FaintStart<S>>> {
+) -> Result<Vec<Linear<S>>> {
     let count = model.parameters.len();
-    let label = |hint: &Hint<S>| hint.start.instance.name().label();
+    let label = |linear: &Linear<S>| linear.instance.name().label();
+    let own_count = |linear: &Linear<S>| linear.size.theta.len() - count;
     let without = minimise(
         &study.problem(model, View::THIN),
         &base.theta,
         &model.bounds(),
         REFIT,
     )?;
-    let mut hinted: Vec<Hint<S>> = instances
+    let best_of_each = |sizes: &mut Vec<Linear<S>>| {
+        sizes.sort_by(|a, b| b.size.gain.total_cmp(&a.size.gain));
+        keep_first_of_each(sizes, label);
+    };
+    let mut hinted: Vec<Linear<S>> = instances
         .par_iter()
         .filter_map(|instance| {
             let extended = study.extend(model, instance);
             let own = own_starts(study, &extended, count, instance, hints);
-            let hint = hint(study, *instance, extended, &own, (&without, View::THIN))?;
-            let by_chance = (hint.start.model.parameters.len() - count - 1) as f64;
-            (hint.gain > by_chance + HINT).then_some(hint)
+            let problem = study.problem(&extended, View::THIN);
+            let size = linear_size_of_shapes(&problem, &extended, &without.theta, &own)?;
+            let hint = Linear::new(*instance, size, without.cost)?;
+            (hint.size.gain > (own_count(&hint) - 1) as f64 + HINT).then_some(hint)
         })
         .collect();
-    best_of_each(&mut hinted, label);
+    best_of_each(&mut hinted);
     hinted.truncate(ASKED);
-    let mut sure: Vec<Hint<S>> = hinted
+    let mut sure: Vec<Linear<S>> = hinted
         .into_par_iter()
-        .filter_map(|Hint { start, shapes, .. }| {
-            let hint = hint(study, start.instance, start.model, &shapes, (base, View::FULL))?;
-            let by_chance = gain_by_chance(hint.start.model.parameters.len() - count);
-            (hint.gain > by_chance + MORE * gained(&label(&hint))).then_some(hint)
+        .filter_map(|Linear { instance, size }| {
+            let extended = study.extend(model, &instance);
+            let shapes = [size.shape, size.theta[count..].to_vec()];
+            let problem = study.problem(&extended, View::FULL);
+            let size = linear_size_of_shapes(&problem, &extended, &base.theta, &shapes)?;
+            let sure = Linear::new(instance, size, base.cost)?;
+            let least = gain_by_chance(own_count(&sure)) + MORE * gained(&label(&sure));
+            (sure.size.gain > least).then_some(sure)
         })
         .collect();
-    best_of_each(&mut sure, label);
+    best_of_each(&mut sure);
     sure.truncate(FITTED);
-    Ok(sure.into_iter().map(|hint| hint.start).collect())
-}
-
-/// What a view of the data says of an effect besides the fit `without` it; `own`: points for its parameters.
-fn hint<S: Study>(
-    study: &S,
-    instance: InstanceOf<S>,
-    model: ModelOf<S>,
-    own: &[Vec<f64>],
-    (without, view): (&Fit, View),
-) -> Option<Hint<S>> {
-    let size = linear_size_of_shapes(&study.problem(&model, view), &model, &without.theta, own)?;
-    let moved = size.theta[without.theta.len()..].to_vec();
-    // More than there is is not to be had.
-    (size.gain < 2.0 * without.cost).then_some(Hint {
-        start: FaintStart {
-            instance,
-            model,
-            theta: size.theta,
-        },
-        shapes: vec![size.shape, moved],
-        gain: size.gain,
-    })
-}
-
-/// Keeps the best choice of each effect, best first.
-fn best_of_each<S: Study>(hints: &mut Vec<Hint<S>>, label: impl Fn(&Hint<S>) -> String) {
-    hints.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let mut known = Vec::new();
-    hints.retain(|hint| {
-        let label = label(hint);
-        let new = !known.contains(&label);
-        known.push(label);
-        new
-    });
+    Ok(sure)
 }

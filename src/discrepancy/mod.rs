@@ -11,6 +11,7 @@ mod faint;
 pub mod joint_trends;
 pub mod localise;
 pub mod outlook;
+mod ranking;
 #[cfg(test)]
 mod resonance_tests;
 pub mod setup;

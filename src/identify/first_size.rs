@@ -40,7 +40,7 @@ pub fn linear_size<D: Modelled, P: LeastSquares>(
     model: &Model<D>,
     base: &[f64],
 ) -> Option<LinearSize> {
-    size_from(problem, model, base, &faintest(model)?)
+    size_from(problem, model, base, (&faintest(model)?, &shapes(model)?))
 }
 
 /// As [`linear_size`], of the effect in each of the shapes that `own` has (values of its parameters, solver's scale): frequencies, places
@@ -63,7 +63,7 @@ pub fn linear_size_of_shapes<D: Modelled, P: LeastSquares>(
     }
     points
         .iter()
-        .filter_map(|point| size_from(problem, model, base, point))
+        .filter_map(|point| size_from(problem, model, base, (point, &is_shape)))
         .max_by(|a, b| a.gain.total_cmp(&b.gain))
 }
 
@@ -80,15 +80,14 @@ fn shapes<D: Modelled>(model: &Model<D>) -> Option<Vec<bool>> {
     Some(stays.into_iter().map(|s| s && !all).collect())
 }
 
-/// `faint`: values of the parameters of the effect, next to where it vanishes.
+/// `faint`: values of the parameters of the effect, next to where it vanishes, and which of them are its shape.
 fn size_from<D: Modelled, P: LeastSquares>(
     problem: &P,
     model: &Model<D>,
     base: &[f64],
-    faint: &[f64],
+    (faint, is_shape): (&[f64], &[bool]),
 ) -> Option<LinearSize> {
     let own = own_parameters(model, faint.len());
-    let is_shape = shapes(model)?;
     let start = [base, faint].concat();
     let mut here = problem.linearise(&start).ok()?;
     for (i, parameter) in own.iter().enumerate().map(|(i, p)| (base.len() + i, p)) {

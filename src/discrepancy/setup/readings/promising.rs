@@ -7,6 +7,7 @@ use super::{
     point_swap, posture_swap, quantity, reciprocal,
 };
 use crate::Result;
+use crate::discrepancy::ranking::keep_first_of_each;
 use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::FrfData;
 
@@ -57,13 +58,9 @@ pub fn proposed(
         all.extend(here);
     }
     // The same reading is proposed from several places.
-    let mut seen: Vec<(&'static str, String)> = Vec::new();
-    all.retain(|p| {
+    keep_first_of_each(&mut all, |p| {
         let finding = p.reading.finding(data, &model.points);
-        let name = (finding.kind, finding.place);
-        let new = !seen.contains(&name);
-        seen.push(name);
-        new
+        (finding.kind, finding.place)
     });
     Ok(all)
 }

@@ -12,7 +12,7 @@ use crate::campaign::Campaign;
 use crate::discrepancy::comparison::compare::ErrorTotals;
 use crate::discrepancy::joint_trends::{JointTrends, joint_trends};
 use crate::discrepancy::localise::named::named;
-use crate::discrepancy::localise::{Localisation, localise};
+use crate::discrepancy::localise::{Localisation, localise, localise_from};
 use crate::discrepancy::outlook::next_measurement;
 use crate::discrepancy::setup::{SetupCheck, examine};
 use crate::discrepancy::{Diagnosis, EffectCandidate, Explained, FrfComparison, NextMeasurement};
@@ -111,7 +111,8 @@ impl CampaignSide for Structure {
         diagnosis: &Diagnosis<Structure>,
         _now: &FrfView,
     ) -> Result<Option<StructureLead>> {
-        let place = Some(localise(study, &case.model)?).filter(|found| found.significant);
+        let baseline = diagnosis.baseline.calibration.clone();
+        let place = Some(localise_from(study, &case.model, baseline)?).filter(|found| found.significant);
         let mut lead = StructureLead {
             place,
             beside: None,

@@ -39,6 +39,11 @@ const REBASED: usize = 2;
 const BETTER: f64 = 1e-3;
 /// Candidates whose solutions the baseline is tried from.
 const LEADERS: usize = 3;
+/// Times what small errors of the setup usually leave (Σ r²/σ²) that an effect takes away at most to be compared with them although it
+/// leaves noise.
+const WITHIN_SLIPS: f64 = 5.0;
+/// Leaders that begin again at a possible size where they have ended at another.
+const LED_AWAY: usize = 4;
 /// Candidates that are fitted again from the best one's baseline.
 const SHARED: usize = 6;
 /// Candidates whose combination with every other one is tried where none explains the data alone.
@@ -466,13 +471,24 @@ impl<'a, S: Study> Engine<'a, S> {
         winner: Option<usize>,
     ) -> Result<Option<usize>> {
         if let Some(w) = winner {
-            self.excuse_candidate(&mut candidates[w])?;
-            let rest = candidates[w].rest.as_ref();
-            if rest.is_none_or(|rest| rest.beyond_slips.is_none()) {
-                return Ok(winner);
+            let winner = &mut candidates[w];
+            self.excuse_candidate(winner)?;
+            let leaves_noise = winner
+                .rest
+                .as_ref()
+                .is_none_or(|rest| rest.beyond_slips.is_none());
+            if leaves_noise && winner.gain > WITHIN_SLIPS * baseline.rest.small_errors {
+                return Ok(Some(w));
             }
         }
-        baseline.rest.beyond_slips = self.beyond_slips(&baseline.rest, self.model, &baseline.theta)?;
+        // What is no larger than small errors of the setup, or nothing explains, may be such errors.
+        let in_question = winner.is_some() || verdict::is_alarmed(candidates, &baseline.rest);
+        baseline.rest.beyond_slips = match in_question || baseline.rest.is_significant() {
+            true => self
+                .study
+                .beyond_slips(self.model, &baseline.theta, &baseline.rest)?,
+            false => None,
+        };
         let mostly_slips = |w: &usize| candidates[*w].rest.as_ref().is_some_and(Rest::is_mostly_slips);
         let Some(w) = winner.filter(mostly_slips) else {
             return Ok(winner);
@@ -697,9 +713,9 @@ impl<'a, S: Study> Engine<'a, S> {
         Ok(())
     }
 
-    /// Where nothing explains the data: effects of the whole structure that have ended at sizes which cannot be, and those on promise
-    /// that a look from where the model stands has passed over, from possible sizes. What comes to lie before others is put among
-    /// the leaders.
+    /// Where nothing explains the data: effects of the whole structure, and leaders, that have ended at sizes which cannot be, and those
+    /// on promise that a look from where the model stands has passed over, from possible sizes. What comes to lie before others is put
+    /// among the leaders.
     fn begin_at_possible_sizes(
         &self,
         tried: &[TriedOf<S>],
@@ -731,7 +747,10 @@ impl<'a, S: Study> Engine<'a, S> {
         });
         let stuck: Vec<TriedOf<S>> = tried
             .iter()
-            .filter(|t| everywhere(&t.instance) && !t.instance.effect.on_promise())
+            .enumerate()
+            .filter(|(place, t)| *place < LED_AWAY || everywhere(&t.instance))
+            .map(|(_, t)| t)
+            .filter(|t| !t.instance.effect.on_promise())
             .filter(cannot_be)
             .cloned()
             .chain(passed_over)

@@ -8,7 +8,7 @@ use super::candidate::{BaselineFit, EffectCandidate};
 use super::something_else;
 use crate::identify::HeldOut;
 use crate::identify::Modelled;
-use crate::identify::rest::Rest;
+use crate::identify::rest::{Rest, RestTest};
 
 /// What the loop says about missing physics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -215,7 +215,7 @@ pub fn decide<D: Modelled>(
         Some(set) if !credible[set.strongest] => Some(set.strongest),
         _ => leader,
     };
-    let excused = match (&set, first) {
+    let needless = match (&set, first) {
         (Some(set), _) => weight_of_slips_alone(set.gain, Some(&set.rest), set.parameters, &baseline.rest),
         (None, Some(w)) => {
             let c = &candidates[w];
@@ -223,6 +223,13 @@ pub fn decide<D: Modelled>(
         }
         (None, None) => 1.0,
     };
+    // Of a model that is far off the slopes promise what such errors do not do: where they leave something else alone, they do not
+    // do without the effect.
+    let not_alone = match baseline.rest.is_significant() {
+        true => something_else::odds_against_slips(&baseline.rest),
+        false => 0.0,
+    };
+    let excused = needless / (1.0 + not_alone);
     let Some(w) = first.filter(|_| excused < 0.5) else {
         decide_without_candidate(&mut decision, candidates, baseline, values);
         return decision;
@@ -325,10 +332,34 @@ const MOST_EVIDENCE: f64 = 100.0;
 /// No verdict is less sure than this.
 const LEAST_SURE: f64 = 0.05;
 
+/// Bayes factor of something hidden against noise, of the test that noise passes least.
+fn evidence_of_tests(tests: &[RestTest]) -> f64 {
+    let least = tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
+    something_else::evidence_of_chance(least * tests.len().max(1) as f64)
+}
+
+/// Whether all together says that something is hidden, although no single test is sure. Few data make nothing less sure, they are no
+/// reason for an alarm.
+pub(super) fn is_alarmed<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest) -> bool {
+    odds_of_something_faint(candidates, rest, f64::INFINITY) >= ALARM
+}
+
+/// Odds of small errors of the setup against something hidden, where all together raises an alarm: their evidence against that of the best
+/// candidate, and what they leave for chance to explain.
+fn odds_of_small_errors<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest) -> f64 {
+    let Some(beyond) = &rest.beyond_slips else {
+        return 0.0;
+    };
+    let refined = candidates.iter().filter(|c| c.refined);
+    let best = refined.map(|c| -c.delta_bic).fold(0.0, f64::max);
+    let more = beyond.gain() / beyond.noise_factor() - best;
+    let left = evidence_of_tests(&beyond.tests);
+    something_else::VISIBLE_ERRORS * evidence_weight(-more.min(MOST_EVIDENCE)) / (1.0 + left)
+}
+
 /// Odds that something is hidden although no candidate is credible and no test is sure, against nothing. `values`: independent ones.
 fn odds_of_something_faint<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest, values: f64) -> f64 {
-    let least = rest.tests.iter().map(|t| t.p_value).fold(1.0, f64::min);
-    let of_tests = something_else::evidence_of_chance(least * rest.tests.len().max(1) as f64);
+    let of_tests = evidence_of_tests(&rest.tests);
     // Credible or not: an effect of an impossible size may stand in for what there is. BIC counts what a free frequency or
     // place can make of noise, which the p-value does not.
     let refined = candidates.iter().filter(|c| c.refined);
@@ -347,14 +378,17 @@ fn decide_without_candidate<D: Modelled>(
 ) {
     if leaves_noise(&baseline.rest, baseline.reduced_chi2) {
         let hidden = odds_of_something_faint(candidates, &baseline.rest, values);
-        // Few data make nothing less sure, they are no reason for an alarm.
-        if odds_of_something_faint(candidates, &baseline.rest, f64::INFINITY) < ALARM {
+        let small_errors = odds_of_small_errors(candidates, &baseline.rest);
+        if !is_alarmed(candidates, &baseline.rest) {
             decision.verdict = DiagnosisVerdict::None;
             decision.confidence = MOST_SURE / (1.0 + hidden);
+        } else if small_errors > 1.0 {
+            decision.verdict = DiagnosisVerdict::None;
+            decision.confidence = MOST_SURE / (1.0 + 1.0 / small_errors);
         } else {
             decision.verdict = DiagnosisVerdict::Unknown;
             decision.best_guess = (!candidates.is_empty()).then_some(0);
-            decision.confidence = MOST_SURE / (1.0 + 1.0 / hidden);
+            decision.confidence = MOST_SURE / (1.0 + 1.0 / hidden + small_errors);
         }
         decision.confidence = decision.confidence.max(LEAST_SURE);
         return;
@@ -380,7 +414,7 @@ pub fn evidence_weight(delta_bic: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::rest::{BeyondSlips, LIKE_FOLDS, RestTest};
+    use crate::identify::rest::{BeyondSlips, LIKE_FOLDS};
 
     /// A rest after small errors of this evidence, with noise of which the folds show this multiple.
     fn after_slips(evidence: f64, noise_factor: f64) -> Rest {

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::own_errors::OwnErrors;
 
@@ -218,6 +218,19 @@ impl RestTest {
     ) -> Option<Self> {
         let std = (2.0 * freedom).sqrt().hypot(noise_known_to * freedom);
         (freedom > 0.0).then(|| Self::new(looks_like, found, freedom, std, freedom))?
+    }
+
+    /// Standard deviations that a value of a normal law lies above its mean where it is as rare as this excess is for noise alone, of so
+    /// many tests. Zero below the mean.
+    pub fn rarity(&self, tests: usize) -> f64 {
+        let p = self.p_value * tests as f64;
+        let as_rare = match p {
+            0.5.. => 0.0,
+            // Beyond that nothing is made of noise.
+            ..1e-100 => f64::INFINITY,
+            _ => -Normal::standard().inverse_cdf(p),
+        };
+        as_rare.min(self.sigmas()).max(0.0)
     }
 
     /// Excess in standard deviations of what noise leaves.

@@ -200,6 +200,8 @@ const LEFT_FAR_MORE: f64 = 1.5;
 const SETTLED: usize = 4;
 /// Lines of all postures together that the screen looks at.
 const SCREENED_LINES: usize = 3000;
+/// As many where the model is far off: most places are told apart there by far more than noise.
+const SCREENED_ELSEWHERE: usize = 1000;
 /// Share of the misfit that the leading form leaves at most to be fitted once more as the model itself is.
 const TAKES_MOST: f64 = 0.7;
 /// Forms of a place that are fitted to all data at most.
@@ -221,11 +223,23 @@ const REFIT_WITHOUT_FOLD: Stopping = Stopping {
 /// # Errors
 /// A model that cannot be calibrated to the data.
 pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Localisation> {
-    let baseline = study.calibrate(model)?;
+    localise_from(study, model, study.calibrate(model)?)
+}
+
+/// As [`localise`], of a model that is calibrated already.
+///
+/// # Errors
+/// A model without a response there.
+pub fn localise_from(
+    study: &StructureStudy,
+    model: &StructureModel,
+    baseline: Calibration,
+) -> Result<Localisation> {
     let theta = &baseline.theta;
     let spots = free_spots(model);
     let lines: usize = study.data.blocks.iter().map(|b| b.frequency_hz.len()).sum();
-    let thinned = study.data.thinned(lines.div_ceil(SCREENED_LINES).max(1), 1);
+    let every = |of: usize| lines.div_ceil(of).max(1);
+    let thinned = study.data.thinned(every(SCREENED_LINES), 1);
     let mut screened = screen_at(model, theta, &thinned, &spots)?;
     let score = |s: &Screened| s.left_free.min(s.left_common);
     screened.sort_by(|a, b| score(a).total_cmp(&score(b)));
@@ -245,10 +259,11 @@ pub fn localise(study: &StructureStudy, model: &StructureModel) -> Result<Locali
         .map(|i| (i, Sought::new(&screened[i], starts.clone())))
         .collect();
     // Where the model is far off, what is linear there says little: the nominal values may be nearer.
+    let few = study.data.thinned(every(SCREENED_ELSEWHERE), 1);
     let elsewhere: Vec<Vec<Screened>> = starts
         .elsewhere
         .iter()
-        .map(|at| screen_at(model, at, &thinned, &spots))
+        .map(|at| screen_at(model, at, &few, &spots))
         .collect::<Result<_>>()?;
     for (k, there) in elsewhere.iter().enumerate() {
         for s in leaders(there, &self::ties(there), FITTED_ELSEWHERE) {

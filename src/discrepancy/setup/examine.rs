@@ -16,7 +16,7 @@ use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
 use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
 use crate::identify::frfs::structure_study::{led_astray, small_errors, starts_elsewhere};
-use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
 use crate::identify::study::{Study, View, try_effects};
 use crate::identify::{StructureModel, StructureStudy};
@@ -67,6 +67,8 @@ const LEAST_GAIN: f64 = 30.0;
 const FITTED: usize = 6;
 /// … and from other places, where it may have been led astray: there the model is no optimum, and the order of promises a rough one.
 const FITTED_ELSEWHERE: usize = 24;
+/// Of those from one place, such as are followed beyond their first steps.
+const FOLLOWED: usize = 8;
 /// Readings that are fitted, for each starting point of the model.
 const READ: usize = 6;
 /// Share of all disagreement from which on a reading is fitted from the nominal values, too.
@@ -77,12 +79,18 @@ const NOISE_KNOWN_TO: f64 = 0.05;
 const NEARLY_ALL: f64 = 0.1;
 /// … and χ² per value from which on more than noise is left.
 const LEFT_OVER: f64 = 1.1;
+/// Share of what stands above the noise on few lines below which a mistake is not followed: half of what is no explanation yet.
+const HOPELESS_SHARE: f64 = 0.2;
 /// Trials that are fitted to all data.
 const REFINED: usize = 3;
 
 const ROUGH: Stopping = Stopping {
     max_iterations: 12,
     relative_decrease: 1e-4,
+};
+const FIRST_STEPS: Stopping = Stopping {
+    max_iterations: 4,
+    ..ROUGH
 };
 const FINE: Stopping = Stopping {
     max_iterations: 6,
@@ -142,7 +150,13 @@ pub fn examine(
     let mut trials = sized(model, &thin, theta, &elsewhere, &all)?;
     let read = proposed(model, &thin, theta)?;
     trials.extend(read_trials(model, &thin, theta, measured, &read, base)?);
-    trials.retain(|t| 2.0 * base - t.chi2 > LEAST_GAIN);
+    let excess = 2.0 * base - values as f64;
+    // Few lines tell how much it explains where much is to be explained.
+    let hopeless = match led_astray(base, values as f64) {
+        true => HOPELESS_SHARE * excess,
+        false => 0.0,
+    };
+    trials.retain(|t| 2.0 * base - t.chi2 > hopeless.max(LEAST_GAIN));
     trials.sort_by(|a, b| a.price(values).total_cmp(&b.price(values)));
     let full_base = 2.0 * cost(model, data, theta)?;
     check.reduced_chi2 = full_base / (2 * data.value_count()) as f64;
@@ -223,30 +237,45 @@ fn sized<'a>(
     elsewhere: &[Vec<f64>],
     all: &'a [Box<dyn Mistake>],
 ) -> Result<Vec<Trial<'a>>> {
-    let mut promising = most_promising(model, thin, theta, all, FITTED)?;
-    for start in elsewhere {
-        promising.extend(most_promising(model, thin, start, all, FITTED_ELSEWHERE)?);
+    let joint = |mistake: &'a dyn Mistake, group: FrfGroup| JointProblem {
+        model,
+        data: thin,
+        mistake,
+        group,
+    };
+    let count = theta.len();
+    let mut first: Vec<(Fit, usize, FrfGroup)> = Vec::new();
+    let places = elsewhere.iter().map(|start| (start.as_slice(), FITTED_ELSEWHERE));
+    for (start, most) in std::iter::once((theta, FITTED)).chain(places) {
+        let mut from_here: Vec<(Fit, usize, FrfGroup)> = most_promising(model, thin, start, all, most)?
+            .into_par_iter()
+            .filter_map(|(index, Score { group, values, .. })| {
+                let fit = joint(all[index].as_ref(), group)
+                    .fit(start, &values, FIRST_STEPS)
+                    .ok()?;
+                Some((fit, index, group))
+            })
+            .collect();
+        // Most lead nowhere, and a few steps tell.
+        from_here.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
+        first.extend(from_here.into_iter().take(FOLLOWED));
     }
-    let fits: Vec<Option<((usize, FrfGroup), Trial)>> = promising
+    let fits: Vec<Option<((usize, FrfGroup), Trial)>> = first
         .into_par_iter()
-        .map(|(start, index, score)| {
+        .map(|(fit, index, group)| {
             let mistake = all[index].as_ref();
-            let joint = JointProblem {
-                model,
-                data: thin,
-                mistake,
-                group: score.group,
-            };
-            let fit = joint.fit(start, &score.values, ROUGH).ok()?;
+            let joint = joint(mistake, group);
+            let (values, _) = joint.values(&fit, 1.0)?;
+            let fit = joint.fit(&fit.theta[..count], &values, ROUGH).ok()?;
             let (values, _) = joint.values(&fit, 1.0)?;
             let (chi2, parameters) = (2.0 * fit.cost, values.len());
             let trial = Trial {
-                cause: Cause::Size(mistake, score.group, values),
-                theta: fit.theta[..theta.len()].to_vec(),
+                cause: Cause::Size(mistake, group, values),
+                theta: fit.theta[..count].to_vec(),
                 chi2,
                 parameters,
             };
-            Some(((index, score.group), trial))
+            Some(((index, group), trial))
         })
         .collect();
     let mut best: Vec<((usize, FrfGroup), Trial)> = Vec::new();
@@ -260,15 +289,15 @@ fn sized<'a>(
     Ok(best.into_iter().map(|(_, trial)| trial).collect())
 }
 
-/// Start, index of a mistake and its linear estimate there: the `most` mistakes with the greatest promise, on at most two groups of FRFs
+/// Index of a mistake and its linear estimate at `start`: the `most` mistakes with the greatest promise, on at most two groups of FRFs
 /// each.
-fn most_promising<'t>(
+fn most_promising(
     model: &StructureModel,
     thin: &FrfData,
-    start: &'t [f64],
+    start: &[f64],
     all: &[Box<dyn Mistake>],
     most: usize,
-) -> Result<Vec<(&'t [f64], usize, Score)>> {
+) -> Result<Vec<(usize, Score)>> {
     let here = Linearised::new(model, thin, start)?;
     let mut scored = Vec::new();
     let small = all.iter().enumerate().filter(|(_, m)| m.is_ever_small());
@@ -280,10 +309,10 @@ fn most_promising<'t>(
     }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let promising = scored.into_iter().filter(|s| s.0 > LEAST_GAIN).take(most);
-    let mut promising: Vec<_> = promising.map(|(_, index, score)| (start, index, score)).collect();
+    let mut promising: Vec<_> = promising.map(|(_, index, score)| (index, score)).collect();
     for (index, mistake) in all.iter().enumerate() {
         let far = mistake.far(model, thin, start)?;
-        promising.extend(far.into_iter().map(|score| (start, index, score)));
+        promising.extend(far.into_iter().map(|score| (index, score)));
     }
     Ok(promising)
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::modal::settings::{SET, Settings};
-use crate::modal::single::curve::{Curve, MIN_LINES, reach};
+use crate::modal::single::curve::{Curve, MIN_LINES, detuning, reach};
 use crate::modal::single::frf_modes::{Disturbance, FrfMode, FrfModes, Method, ModeEstimate};
 use crate::modal::single::local_fit::{self, LocalSolution, Pole, Problem, ROUGHLY_SETTLED, SETTLED};
 use crate::modal::single::method_bias::{FittedCurves, MethodBias};
@@ -72,6 +72,8 @@ const WORTH_TELLING: f64 = 0.02;
 const MUCH_BETTER: f64 = 0.7;
 /// Modes of one FRF closer than this part of their half-width are one.
 const SAME_WIDTHS: f64 = 0.1;
+/// Standard deviations of noise that a mode rises above at a line that shows it.
+const LEAST_HEIGHT: f64 = 3.0;
 /// Fewer lines than this inside the half-power band are worth a warning.
 const FINE_LINES: f64 = 3.0;
 
@@ -276,7 +278,7 @@ fn analyse(ready: Ready, conjugated: bool, effort: Effort) -> FrfModes {
     });
     let (modes, undetermined): (Vec<FrfMode>, Vec<FrfMode>) = std::mem::take(&mut result.modes)
         .into_iter()
-        .partition(|mode| match what_is_open(mode, &curve, &peaks) {
+        .partition(|mode| match what_is_open(mode, &curve, &peaks, &noise_std) {
             Some(why) => {
                 refused.push(format!("{:.2} Hz ({why})", mode.best().frequency_hz));
                 false
@@ -294,7 +296,7 @@ fn analyse(ready: Ready, conjugated: bool, effort: Effort) -> FrfModes {
 }
 
 /// What the lines leave open of a mode, all that is known of its errors put together, where that is too much to call it one.
-fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak]) -> Option<&'static str> {
+fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak], noise_std: &[f64]) -> Option<&'static str> {
     let best = mode.best();
     let distance = |p: &FrfPeak| (curve.frequency_hz[p.index] - best.frequency_hz).abs();
     let peak = peaks.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
@@ -310,7 +312,22 @@ fn what_is_open(mode: &FrfMode, curve: &Curve, peaks: &[FrfPeak]) -> Option<&'st
     let unknown_width = best
         .damping_std
         .is_some_and(|std| std > MAX_RELATIVE_STD * best.damping_ratio);
-    (unknown_width && peak.rise < RIPPLE).then_some("a ripple whose width its lines do not determine")
+    if !unknown_width {
+        return None;
+    }
+    if peak.rise < RIPPLE {
+        return Some("a ripple whose width its lines do not determine");
+    }
+    let shows = |line: usize| {
+        let residue = best.modal_constant? / (2.0 * TAU * best.frequency_hz);
+        let u = detuning(*curve.frequency_hz.get(line)?, best.frequency_hz);
+        let height = (residue / Complex64::new(best.damping_ratio, u)).norm();
+        Some(height >= LEAST_HEIGHT * noise_std.get(line)?)
+    };
+    let beside = [peak.index.wrapping_sub(1), peak.index + 1];
+    // Its skirts tell a mode from a disturbance.
+    (!beside.into_iter().any(|line| shows(line).unwrap_or(true)))
+        .then_some("one line that stands out, without the skirts of a mode")
 }
 
 /// A peak with the first estimate of its pole.
@@ -686,9 +703,9 @@ fn judge(
         return Err("its lines do not determine its frequency".into());
     }
     // Height of the mode at the line nearest to it, against the noise.
-    let u = crate::modal::single::curve::detuning(curve.frequency_hz[peak.index], frequency_hz);
+    let u = detuning(curve.frequency_hz[peak.index], frequency_hz);
     let height = (residue / Complex64::new(damping_ratio, u)).norm();
-    if height < 3.0 * noise_std {
+    if height < LEAST_HEIGHT * noise_std {
         return Err("the fitted mode is lost in the noise".into());
     }
     Ok(ModeEstimate {

@@ -456,3 +456,21 @@ fn a_resonance_narrower_than_a_line_is_no_ripple() {
         .collect();
     assert_eq!(at, [180.0, 410.0], "{:?} {:?}", found.undetermined, found.remarks);
 }
+
+/// A disturbance of one line, well above what is around it.
+#[test]
+fn one_line_that_stands_out_is_no_mode() {
+    let modes = [SyntheticMode::new(180.0, 0.009, 1.0)];
+    let (f, mut h) = Synthetic::new(5.0, 800.0, 1.0, &modes)
+        .with_noise(0.0, 1e-3, 7)
+        .frf();
+    let line = f.iter().position(|f| *f == 410.0).unwrap();
+    h[line] *= 3.0;
+    let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
+    let at: Vec<f64> = found
+        .modes
+        .iter()
+        .map(|m| m.best().frequency_hz.round())
+        .collect();
+    assert_eq!(at, [180.0], "{:?}", found.remarks);
+}

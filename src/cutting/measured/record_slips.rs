@@ -159,7 +159,6 @@ fn ran_rpm(record: &CutAnalysis) -> Option<f64> {
 
 /// Cuts of which each shows the speed stated for the other.
 fn exchanged(records: &[&CutAnalysis]) -> Vec<[String; 2]> {
-    let is_near = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
     let at_odds: Vec<(&CutAnalysis, f64)> = records
         .iter()
         .filter_map(|record| Some((*record, ran_rpm(record)?)))
@@ -167,11 +166,17 @@ fn exchanged(records: &[&CutAnalysis]) -> Vec<[String; 2]> {
     let mut pairs = Vec::new();
     for (n, (a, ran_a)) in at_odds.iter().enumerate() {
         let mut others = at_odds[n + 1..].iter();
-        let other =
-            others.find(|(b, ran_b)| is_near(*ran_a, b.spindle_rpm) && is_near(*ran_b, a.spindle_rpm));
+        let other = others.find(|(b, ran_b)| are_exchanged([a.spindle_rpm, *ran_a], [b.spindle_rpm, *ran_b]));
         pairs.extend(other.map(|(b, _)| [a.id.clone(), b.id.clone()]));
     }
     pairs
+}
+
+/// Whether of two cuts, each with its stated speed and the one it ran at, each ran at the other's stated speed, and not both a little beside
+/// the same one.
+fn are_exchanged([stated_a, ran_a]: [f64; 2], [stated_b, ran_b]: [f64; 2]) -> bool {
+    let is_near = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
+    is_near(ran_a, stated_b) && is_near(ran_b, stated_a) && !is_near(stated_a, stated_b)
 }
 
 /// Half of the stated frequency may be chatter as well, in which every second tooth cuts alike.
@@ -342,4 +347,17 @@ fn is_at_zero(own: &ChannelAnalysis, cuts: &[&CutAnalysis], expected: f64) -> bo
     let usual = median(&zeros);
     let near = |level: f64| (level - usual).abs() < AT_ZERO * expected;
     !zeros.is_empty() && zeros.iter().all(|zero| near(*zero)) && near(own.whole.mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::are_exchanged;
+
+    #[test]
+    fn cuts_that_ran_beside_one_speed_are_not_exchanged() {
+        assert!(are_exchanged([800.0, 1201.0], [1200.0, 799.0]));
+        assert!(!are_exchanged([800.0, 1201.0], [1200.0, 1190.0]));
+        // A spindle that wanders.
+        assert!(!are_exchanged([809.0, 802.0], [809.0, 803.0]));
+    }
 }

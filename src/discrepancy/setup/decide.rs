@@ -18,6 +18,32 @@ pub struct TriedMistake {
     pub at_bound: bool,
 }
 
+impl TriedMistake {
+    /// Whether it changes the data as another one does, so that nothing in them can tell the two apart.
+    fn does_the_same(&self, other: &TriedMistake) -> bool {
+        const ROUNDING: f64 = 1e-6;
+        let what = |t: &TriedMistake| (t.finding.kind, t.finding.place.clone());
+        self.parameters == other.parameters
+            && (self.chi2 - other.chi2).abs() <= ROUNDING * self.chi2.min(other.chi2)
+            && what(self) != what(other)
+    }
+
+    /// What to do about it, and what else it may be.
+    fn remedy_with<'t>(&self, same: impl Iterator<Item = &'t TriedMistake>) -> String {
+        let same: Vec<String> = same
+            .map(|t| format!("{} ({})", t.finding.kind, t.finding.place))
+            .collect();
+        match same.is_empty() {
+            true => self.finding.remedy.clone(),
+            false => format!(
+                "{} These data cannot tell it from {}.",
+                self.finding.remedy,
+                same.join(" or ")
+            ),
+        }
+    }
+}
+
 pub struct SetupDecision {
     pub findings: Vec<SetupFinding>,
     pub reduced_chi2: f64,
@@ -37,6 +63,9 @@ const EXPLAINS: [f64; 2] = [0.9, 0.4];
 const LATE: [&str; 2] = ["amplifier-low-pass", "late-channel"];
 /// Mistakes that make all forces of a cut larger by one factor: of a straight edge nothing tells them apart.
 const LARGER: [&str; 2] = ["axial-depth", "channel-gain"];
+
+/// Of two that nothing in the data tells apart the rarer one: angles come from the controller, axes are written down by hand.
+const RARE: &str = "encoder-offset";
 
 /// The best that the library of effects can do on these data.
 #[derive(Debug, Clone, Default)]
@@ -121,16 +150,20 @@ pub fn decide(
     // Small errors everywhere have paid for themselves already.
     let small_errors = small_errors.map(|gain| bic(base - gain, 0, 1.0));
     let weights: Vec<f64> = bics.iter().map(|b| evidence_weight(b - lowest)).collect();
-    // Two forms of one mistake (the order of a filter, or the delay that it is) are no rivals: the better one speaks for both.
+    // Two forms of one mistake (the order of a filter, or the delay that it is) are no rivals, nor are two that do the same to the data
+    // (axes exchanged, or the first joint a quarter turn on): the better one speaks for both.
     let alike = |a: &TriedMistake, b: &TriedMistake| {
         let both = |kinds: &[&str]| [a, b].iter().all(|t| kinds.contains(&t.finding.kind));
-        a.finding.place == b.finding.place
-            && (a.finding.kind == b.finding.kind || both(&LATE) || both(&LARGER))
+        let of_one_sort = a.finding.kind == b.finding.kind || both(&LATE) || both(&LARGER);
+        (a.finding.place == b.finding.place && of_one_sort) || a.does_the_same(b)
     };
+    let order = |i: usize| (RARE == tried[i].finding.kind, bics[i], i);
     let first_of_its_kind = |i: usize| {
-        !(0..tried.len()).any(|j| {
-            j != i && alike(&tried[i], &tried[j]) && { bics[j] < bics[i] || (bics[j] == bics[i] && j < i) }
-        })
+        let speaks = |j: usize| match tried[i].does_the_same(&tried[j]) {
+            true => order(j) < order(i),
+            false => (bics[j], j) < (bics[i], i),
+        };
+        !(0..tried.len()).any(|j| j != i && alike(&tried[i], &tried[j]) && speaks(j))
     };
     let weights: Vec<f64> = (0..tried.len())
         .map(|i| if first_of_its_kind(i) { weights[i] } else { 0.0 })
@@ -151,6 +184,7 @@ pub fn decide(
             let alone = 1.0 / (1.0 + odds_against(t.chi2, base, noise));
             SetupFinding {
                 confidence: MOST * weight / sum * explains * possible * alone,
+                remedy: t.remedy_with(tried.iter().filter(|other| t.does_the_same(other))),
                 ..t.finding.clone()
             }
         })

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
+use super::apart::posture_apart;
 use super::decide::{Noise, Rival, Rivals, TriedMistake, decide};
 use super::finding::SetupFinding;
 use super::fit::JointProblem;
@@ -143,13 +144,19 @@ pub fn examine(
     let values = 2 * thin.value_count();
     let base = cost(model, &thin, theta)?;
     let all = mistakes::all(model, &thin);
-    let elsewhere = match led_astray(base, values as f64) {
+    let apart = posture_apart(model, &thin, theta, measured);
+    let mut elsewhere = match led_astray(base, values as f64) {
         true => starts_elsewhere(model, measured),
         false => Vec::new(),
     };
+    // What is wrong at one posture shows best from where the others put the model.
+    elsewhere.extend(apart.as_ref().map(|a| a.theta.clone()));
     let mut trials = sized(model, &thin, theta, &elsewhere, &all)?;
-    let read = proposed(model, &thin, theta)?;
-    trials.extend(read_trials(model, &thin, theta, measured, &read, base)?);
+    let nominal = model.nominal_theta();
+    let mut starts = vec![theta];
+    starts.extend(apart.as_ref().map(|a| a.theta.as_slice()));
+    let read = readings::proposed(model, &thin, &[&starts[..], &[&nominal]].concat(), READ)?;
+    trials.extend(read_trials(model, &thin, &starts, measured, &read, base)?);
     let excess = 2.0 * base - values as f64;
     // Few lines tell how much it explains where much is to be explained.
     let hopeless = match led_astray(base, values as f64) {
@@ -167,8 +174,16 @@ pub fn examine(
         .par_iter()
         .filter_map(|t| refined(model, data, t, measured, full_base).ok())
         .collect();
+    let mut rival = Some(rival);
+    let mut library = None;
+    let mut known = || {
+        if let Some(ask) = rival.take() {
+            library = ask();
+        }
+        library.clone()
+    };
     let rivals = || Rivals {
-        library: rival(),
+        library: known(),
         small_errors: match beyond_slips {
             Some(known) => Some(share * known.gain()),
             None => slips::gain(model, data, theta).ok(),
@@ -183,10 +198,15 @@ pub fn examine(
         check.reduced_chi2 = decision.reduced_chi2;
         check.explained_share = decision.explained_share;
         check.findings.extend(decision.findings);
-        check
-            .findings
-            .sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     }
+    if let Some(apart) = apart
+        && !check.findings.iter().any(SetupFinding::is_likely)
+    {
+        check.findings.extend(apart.finding(data, known().as_ref()));
+    }
+    check
+        .findings
+        .sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     Ok(check)
 }
 
@@ -317,17 +337,12 @@ fn most_promising(
     Ok(promising)
 }
 
-fn proposed(model: &StructureModel, thin: &FrfData, theta: &[f64]) -> Result<Vec<readings::Proposed>> {
-    let nominal = model.nominal_theta();
-    readings::proposed(model, thin, &[theta, &nominal], READ)
-}
-
-/// Readings with the baseline fitted anew, from where it stood, from the nominal values and from where the measured modes put it: most
+/// Readings with the baseline fitted anew, from `starts`, from the nominal values and from where the measured modes put it: most
 /// readings leave those where they are.
 fn read_trials<'a>(
     model: &StructureModel,
     thin: &FrfData,
-    theta: &[f64],
+    starts: &[&[f64]],
     measured: Option<&[f64]>,
     read: &'a [readings::Proposed],
     base: f64,
@@ -338,7 +353,10 @@ fn read_trials<'a>(
             let reading = proposed.reading.as_ref();
             let data = reading.corrected(thin);
             let read = model_read(model, reading);
-            let near = minimise(&problem(&read, &data), theta, &read.bounds(), ROUGH).ok()?;
+            let fits = starts
+                .iter()
+                .filter_map(|start| minimise(&problem(&read, &data), start, &read.bounds(), ROUGH).ok());
+            let near = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
             if led_astray(near.cost, 2.0 * data.value_count() as f64)

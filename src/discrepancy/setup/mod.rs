@@ -6,6 +6,7 @@
 //! filed under another): the data are put right and the baseline is fitted again. A finding has to be more than chance, to
 //! leave less than the physics of the library would, and to explain what stands above the noise.
 
+mod apart;
 mod care;
 mod cutting;
 mod decide;

@@ -261,6 +261,66 @@ fn wrong_readings_are_found() {
     assert!(found.place.starts_with("posture b"), "{found:?}");
 }
 
+/// Measured at a posture that is in no list: no mistake has a name for it, and without it the others agree. Where an effect explains it
+/// as well, nothing is said against the files.
+#[test]
+fn a_posture_that_contradicts_all_others_is_told() {
+    let model = model();
+    let mut data = measured(&model, None, 8);
+    let block = Arc::make_mut(&mut data.blocks[2]);
+    for (joint, off_rad) in [0.4, -0.3, 0.25, -0.5, 0.35, 0.6].into_iter().enumerate() {
+        block.kinematics = block.kinematics.turned(joint + 1, off_rad);
+    }
+    let told = check(&model, &data);
+    let found = told.likely().unwrap_or_else(|| panic!("{:?}", told.findings));
+    assert_eq!(
+        (found.kind, found.place.as_str()),
+        ("posture-apart", "posture c contradicts all others")
+    );
+    assert!(found.remedy.contains("leaves 1.0"), "{}", found.remedy);
+    let explained = Rival {
+        label: "contact@tool".into(),
+        gain_share: 0.999,
+        parameters: 2,
+    };
+    let check = examine(&model, &data, &truth(&model), None, None, || Some(explained)).unwrap();
+    assert!(check.likely().is_none(), "{:?}", check.findings);
+    // Three postures of which none is wrong.
+    assert!(check_without(&model, &data, 2).findings.is_empty());
+}
+
+/// Hits and responses along X and Y of the tool alone, exchanged at one posture.
+#[test]
+fn axes_exchanged_at_one_posture_are_found() {
+    let model = model();
+    let mut data = measured(&model, None, 9);
+    for block in &mut data.blocks {
+        Arc::make_mut(block).frfs.retain(|f| {
+            f.response.point == 0 && f.response.axis == f.reference.axis && f.response.axis != Axis::Z
+        });
+    }
+    let block = Arc::make_mut(&mut data.blocks[1]);
+    let [x, y] = [0, 1].map(|k| (block.frfs[k].receptance.clone(), block.frfs[k].noise_std.clone()));
+    (block.frfs[0].receptance, block.frfs[0].noise_std) = y;
+    (block.frfs[1].receptance, block.frfs[1].noise_std) = x;
+    let check = check(&model, &data);
+    let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
+    assert_eq!(found.kind, "axes", "{found:?}");
+    assert!(found.place.starts_with("posture b"), "{found:?}");
+    // The robot turned by a quarter about its first joint looks the same.
+    assert!(
+        found
+            .remedy
+            .contains("cannot tell it from encoder-offset (joint 1, posture b)"),
+        "{found:?}"
+    );
+}
+
+/// Without one posture.
+fn check_without(model: &StructureModel, data: &FrfData, posture: usize) -> SetupCheck {
+    check(model, &data.filtered(|p| p != posture))
+}
+
 /// Angles that the controller counts otherwise, and files in millimetres.
 #[test]
 fn other_conventions_and_units_are_found() {

@@ -58,12 +58,12 @@ fn log_bayes_factor(gain: f64, rest: &Rest) -> f64 {
     if let Some(largest) = rest.largest() {
         // Where small errors were fitted, what they leave tells more than the size of the rest.
         return excused(gain, largest, rest)
-            .unwrap_or_else(|| of_test(gain, largest, rest.small_errors, rest_of_a_stand_in, 1));
+            .unwrap_or_else(|| of_test(gain, largest, rest.small_errors, rest_of_a_stand_in));
     }
     let factors = rest
         .tests
         .iter()
-        .map(|t| of_test(gain, t, rest.small_errors, part_of_a_rest, rest.tests.len()));
+        .map(|t| of_test(gain, t, rest.small_errors, part_of_a_rest));
     let (low, high) = factors.fold((0.0f64, 0.0f64), |(low, high), f| (low.min(f), high.max(f)));
     low + high
 }
@@ -167,12 +167,11 @@ pub fn odds_of_something_faint(of_tests: f64, of_candidates: f64, values: f64) -
     odds_of_too_little_data(values) * 0.5 * (1.0 + of_tests) * 0.5 * (1.0 + of_candidates)
 }
 
-/// `stand_in`: density of rest / gain if the effect stands in for something else; `tests`: of how many this one may be the one that finds
-/// most.
-fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f64, tests: usize) -> f64 {
-    // Less than noise is no better than noise; squares of noise scatter upwards farther than a normal law does.
+/// `stand_in`: density of rest / gain if the effect stands in for something else.
+fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f64) -> f64 {
+    // Less than noise is no better than noise.
     let excess = test.excess.max(0.0);
-    let noise = ln_normal(test.rarity(tests) * test.std, test.std);
+    let noise = ln_normal(excess, test.std);
     let there = [
         (1.0 - VISIBLE_ERRORS - NEARLY_RIGHT).ln() + noise,
         VISIBLE_ERRORS.ln() + log_density(excess, test.std, small_errors, |u| (-u).exp()),

@@ -344,8 +344,8 @@ pub(super) fn is_alarmed<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &
     odds_of_something_faint(candidates, rest, f64::INFINITY) >= ALARM
 }
 
-/// Odds of small errors of the setup against something hidden, where all together raises an alarm: their evidence against that of the best
-/// candidate, and what they leave for chance to explain.
+/// Odds of small errors of the setup against something hidden, where all together raises an alarm: how likely their sizes are, their
+/// evidence against that of the best candidate, and what they leave for chance to explain.
 fn odds_of_small_errors<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &Rest) -> f64 {
     let Some(beyond) = &rest.beyond_slips else {
         return 0.0;
@@ -354,7 +354,8 @@ fn odds_of_small_errors<D: Modelled>(candidates: &[EffectCandidate<D>], rest: &R
     let best = refined.map(|c| -c.delta_bic).fold(0.0, f64::max);
     let more = beyond.gain() / beyond.noise_factor() - best;
     let left = evidence_of_tests(&beyond.tests);
-    something_else::VISIBLE_ERRORS * evidence_weight(-more.min(MOST_EVIDENCE)) / (1.0 + left)
+    something_else::VISIBLE_ERRORS * (-beyond.unlikely).exp() * evidence_weight(-more.min(MOST_EVIDENCE))
+        / (1.0 + left)
 }
 
 /// Odds that something is hidden although no candidate is credible and no test is sure, against nothing. `values`: independent ones.

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::own_errors::OwnErrors;
 
@@ -84,6 +84,9 @@ pub const SMALL_ERROR: f64 = 0.01;
 /// Chance at which noise passes for structure. Of hundreds of campaigns with four tests each none should; what is as
 /// improbable as this is physics without a name far more often than noise.
 const SIGNIFICANT_P: f64 = 1e-5;
+/// What these are, for people.
+const SMALL_ERRORS: &str =
+    "angles of joints, sensors and hits, gain of the hammer, stiffness from posture to posture, warming up";
 /// What the patterns of one place look like.
 pub const LIKE_A_PLACE: &str = "one law at one place of the structure, the same at all postures";
 /// What the patterns of folds with parameters of their own look like.
@@ -113,11 +116,27 @@ impl Rest {
         }
         let share = self.share_of_slips()?;
         Some(format!(
-            "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it (angles of joints, sensors and hits, gain \
-             of the hammer, stiffness from posture to posture, warming up)",
+            "{:.1} % of the signal, {:.0} % of it as small errors of every setup leave it ({SMALL_ERRORS})",
             100.0 * self.share_of_signal(largest.excess),
             100.0 * share,
         ))
+    }
+
+    /// Why nothing is called missing although not all that is left is noise; `None` where it is.
+    pub fn small_errors_in_words(&self) -> Option<String> {
+        // Too faint for a single test, they were sought because all of them together said that something is there.
+        let faint = || {
+            (self.beyond_slips.is_some() && !self.is_significant()).then(|| {
+                format!(
+                    "no line by itself stands above the noise, and what all of them together show is explained better by small errors of \
+                     every setup than by any effect ({SMALL_ERRORS})"
+                )
+            })
+        };
+        let plain = self.excuse_in_words();
+        plain
+            .map(|left| format!("what stands above the noise is {left}"))
+            .or_else(faint)
     }
 
     /// The same where each curve has errors of its own.
@@ -218,19 +237,6 @@ impl RestTest {
     ) -> Option<Self> {
         let std = (2.0 * freedom).sqrt().hypot(noise_known_to * freedom);
         (freedom > 0.0).then(|| Self::new(looks_like, found, freedom, std, freedom))?
-    }
-
-    /// Standard deviations that a value of a normal law lies above its mean where it is as rare as this excess is for noise alone, of so
-    /// many tests. Zero below the mean.
-    pub fn rarity(&self, tests: usize) -> f64 {
-        let p = self.p_value * tests as f64;
-        let as_rare = match p {
-            0.5.. => 0.0,
-            // Beyond that nothing is made of noise.
-            ..1e-100 => f64::INFINITY,
-            _ => -Normal::standard().inverse_cdf(p),
-        };
-        as_rare.min(self.sigmas()).max(0.0)
     }
 
     /// Excess in standard deviations of what noise leaves.

@@ -177,11 +177,12 @@ const JOINTS_TOLD: usize = 2;
 
 fn nothing(card: &mut VerdictCard, baseline: &BaselineFit, added: &[String], data: &str) {
     let more = if added.is_empty() { "" } else { " more" };
-    (card.headline, card.explanation) = match baseline.rest.excuse_in_words() {
-        Some(left) => (
+    (card.headline, card.explanation) = match baseline.rest.small_errors_in_words() {
+        Some(why) => (
             format!("Nothing{more} stands above the small errors of the setup"),
             format!(
-                "What stands above the noise is {left}. An effect smaller than that cannot be seen in these {data}."
+                "{}. An effect smaller than that cannot be seen in these {data}.",
+                capitalised(&why)
             ),
         ),
         None => (

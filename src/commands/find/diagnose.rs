@@ -23,7 +23,7 @@ use crate::identify::{Estimate, HeldOut, Modelled, Options};
 use crate::report::verdict_card::departure;
 use crate::report::words;
 use crate::revision::Side;
-use crate::text::chance;
+use crate::text::{capitalised, chance};
 
 pub fn run(args: SideArgs) -> Result<Outcome> {
     let campaign = Campaign::load(&args.campaign.dir)?;
@@ -556,11 +556,11 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
                 wrapped(&format!("How it shows: {}", effect.fingerprint()), "  "),
             )
         }
-        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
-            Some(left) => format!(
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.small_errors_in_words() {
+            Some(why) => format!(
                 "{} that the library knows is larger than the small errors of the setup ({sure})\n{}",
                 Emphasis::Good.on("NOTHING"),
-                wrapped(&format!("What stands above the noise is {left}."), "  ")
+                wrapped(&format!("{}.", capitalised(&why)), "  ")
             ),
             None => format!(
                 "{} is missing: what is left looks like noise ({sure})\n",

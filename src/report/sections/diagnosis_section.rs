@@ -44,10 +44,9 @@ pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String 
             let explanation = winner.instance.effect.explanation();
             format!("The model lacks {title} ({sure}). {explanation}")
         }
-        (DiagnosisVerdict::None, _) => match d.baseline.rest.excuse_in_words() {
-            Some(left) => format!(
-                "The model lacks nothing that is larger than the small errors of the setup ({sure}): what stands above the \
-                 noise is {left}."
+        (DiagnosisVerdict::None, _) => match d.baseline.rest.small_errors_in_words() {
+            Some(why) => format!(
+                "The model lacks nothing that is larger than the small errors of the setup ({sure}): {why}."
             ),
             None => {
                 format!(

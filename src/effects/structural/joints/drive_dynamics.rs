@@ -80,9 +80,9 @@ impl Effect<Structure> for DriveDynamics {
         soft.or_else(|| {
             damping.outside(
                 "a servo's damping",
-                [0.02, 2.5],
+                [0.1, 2.5],
                 (1.0, "of critical"),
-                "position loops are tuned to 0.3 to 1",
+                "position loops are tuned to 0.3 to 1, and one that rings for long is no loop but a part that resonates",
             )
         })
     }

@@ -223,13 +223,7 @@ pub fn decide<D: Modelled>(
         }
         (None, None) => 1.0,
     };
-    // Of a model that is far off the slopes promise what such errors do not do: where they leave something else alone, they do not
-    // do without the effect.
-    let not_alone = match baseline.rest.is_significant() {
-        true => something_else::odds_against_slips(&baseline.rest),
-        false => 0.0,
-    };
-    let excused = needless / (1.0 + not_alone);
+    let excused = needless * slips_can_be_all(&baseline.rest);
     let Some(w) = first.filter(|_| excused < 0.5) else {
         decide_without_candidate(&mut decision, candidates, baseline, values);
         return decision;
@@ -324,6 +318,15 @@ fn weight_of_slips_alone(gain: f64, rest: Option<&Rest>, parameters: usize, base
     })
 }
 
+/// Probability that small errors of the setup are all there is behind a rest. Of a model that is far off the slopes promise what such
+/// errors do not do; 1 where no test finds more than noise.
+fn slips_can_be_all(rest: &Rest) -> f64 {
+    match rest.is_significant() {
+        true => 1.0 / (1.0 + something_else::odds_against_slips(rest)),
+        false => 1.0,
+    }
+}
+
 /// Odds of something faint above which an alarm is raised although no single test is sure of it: an alarm at nothing costs as
 /// much as so many faint effects that were missed.
 const ALARM: f64 = 20.0;
@@ -415,6 +418,7 @@ pub fn evidence_weight(delta_bic: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Structure;
     use crate::identify::rest::{BeyondSlips, LIKE_FOLDS};
 
     /// A rest after small errors of this evidence, with noise of which the folds show this multiple.
@@ -462,6 +466,45 @@ mod tests {
         // What small errors alone leave of a model that is far off is not noise, however alike its values are.
         let far_off = after_slips(1000.0, 5000.0);
         assert!(weight(40_000.0, &with, &far_off) < 1e-6);
+    }
+
+    #[test]
+    fn small_errors_are_no_excuse_for_what_they_leave() {
+        let found = |excess: f64, left: f64| {
+            let test = |excess: f64, p_value: f64| RestTest {
+                looks_like: LIKE_FOLDS,
+                excess,
+                std: 10.0,
+                p_value,
+                noise_factor: 1.0,
+            };
+            let mut rest = after_slips(0.5 * (excess - left), 1.0);
+            rest.tests = vec![test(excess, 1e-20)];
+            rest.beyond_slips.as_mut().unwrap().tests = vec![test(left, 0.5)];
+            slips_can_be_all(&rest)
+        };
+        // Errors of about the usual energy, 100, of which nothing is left; a model that is far off, of which they leave half.
+        assert!(found(150.0, 0.0) > 0.5, "{}", found(150.0, 0.0));
+        assert!(found(1e6, 5e5) < 1e-3, "{}", found(1e6, 5e5));
+        // Nothing plain to explain.
+        assert_eq!(slips_can_be_all(&after_slips(10.0, 1.0)), 1.0);
+    }
+
+    #[test]
+    fn an_alarm_may_be_small_errors_that_explain_it_and_leave_noise() {
+        let odds = |rest: &Rest| odds_of_small_errors::<Structure>(&[], rest);
+        assert!(odds(&after_slips(200.0, 1.0)) > 5.0);
+        assert!(odds(&after_slips(10.0, 1.0)) < 0.5);
+        // Of values that err together half say as much.
+        assert!(odds(&after_slips(20.0, 2.0)) < odds(&after_slips(20.0, 1.0)));
+        let mut leaves_more = after_slips(200.0, 1.0);
+        leaves_more.beyond_slips.as_mut().unwrap().tests[0].p_value = 1e-12;
+        assert!(odds(&leaves_more) < 1e-3);
+        let never_sought = Rest {
+            beyond_slips: None,
+            ..after_slips(200.0, 1.0)
+        };
+        assert_eq!(odds(&never_sought), 0.0);
     }
 
     fn errors(by_fold: &[f64]) -> HeldOut {

@@ -8,7 +8,7 @@ use super::trend::{SIGNIFICANT, TrendPoint, test};
 use crate::Result;
 use crate::data::Posture;
 use crate::identify::frfs::frf_data::FrfData;
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::levenberg_marquardt::{LeastSquares, Linearisation, Stopping, minimise};
 use crate::identify::{StructureModel, StructureStudy};
 use crate::parameter::Scale;
@@ -320,12 +320,7 @@ fn changes(
     free: &[usize],
 ) -> Result<(DVector<f64>, DVector<f64>)> {
     let problem = OwnJoints {
-        problem: FrfProblem {
-            model,
-            data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        },
+        problem: FrfProblem::likelihood(model, data),
         centre: theta,
         free,
     };
@@ -424,12 +419,7 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let data = measured_at(&model, &postures, of, &mut random);
         let study = StructureStudy::new(data, Options::default());
-        let everywhere = FrfProblem {
-            model: &model,
-            data: &study.data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        };
+        let everywhere = FrfProblem::likelihood(&model, &study.data);
         let fit = minimise(&everywhere, &truth, &model.bounds(), OWN).unwrap();
         let named: Vec<Posture> = postures
             .iter()

@@ -12,7 +12,7 @@ use crate::discrepancy::diagnosis::Diagnosis;
 use crate::discrepancy::outlook::lab::{Lab, NewPoint, Setup};
 use crate::discrepancy::verdict::DiagnosisVerdict;
 use crate::effects::Structure;
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::{FrfData, LeastSquares};
 
 /// Standard deviations that a measurement should promise: what is found scatters by two about their square's root, and
@@ -162,12 +162,7 @@ fn best(
     };
     let (against_b, against_a) = (table(ab)?, table(ba)?);
     let known = |c: &StructureCandidate| {
-        let problem = FrfProblem {
-            model: &c.model,
-            data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        };
+        let problem = FrfProblem::likelihood(&c.model, data);
         problem.linearise(&c.theta).map(|l| l.hessian)
     };
     let (known_b, known_a) = (known(b)?, known(a)?);

@@ -11,7 +11,7 @@ use crate::Result;
 use crate::data::Posture;
 use crate::discrepancy::outlook::lab::Lab;
 use crate::effects::{DataSummary, Instance, Registry, Structure};
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::{FrfData, LeastSquares, StructureModel};
 
@@ -308,12 +308,7 @@ fn filled(model: &StructureModel, theta: &[f64], data: &FrfData) -> Result<FrfDa
 
 /// Fits `model` from `start`; `share`: all planned values over those of `data`.
 fn fit(model: &StructureModel, start: &[f64], data: &FrfData, share: f64) -> Result<Fitted> {
-    let problem = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
-    };
+    let problem = FrfProblem::likelihood(model, data);
     let found = minimise(&problem, start, &model.bounds(), STOPPING)?;
     Ok(Fitted {
         // The priors are part of what is fitted, not of what the measurement shows.
@@ -341,12 +336,7 @@ fn imitate(
         let own = &model.parameters[truth.baseline.theta.len()..];
         let proposed = instance.effect.starts(instance.at(), &base.known(summary), &[]);
         let starts = std::iter::once(own.iter().map(|p| p.nominal).collect::<Vec<f64>>()).chain(proposed);
-        let problem = FrfProblem {
-            model: &model,
-            data: &truth.data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        };
+        let problem = FrfProblem::likelihood(&model, &truth.data);
         let mut ranked: Vec<(f64, Vec<f64>)> = starts
             .map(|start| {
                 let inside = own.iter().zip(start).map(|(p, v)| p.internal_within(v));
@@ -383,12 +373,7 @@ fn additions(
         .map(|lack| {
             let truth = &subjects[lack.truth];
             let table = lab.prospects((&truth.model, &truth.theta), (&lack.rival, &lack.fitted.theta))?;
-            let problem = FrfProblem {
-                model: &lack.rival,
-                data,
-                misfit: Misfit::Complex,
-                stride: 1,
-            };
+            let problem = FrfProblem::likelihood(&lack.rival, data);
             let known = problem.linearise(&lack.fitted.theta)?.hessian;
             let grown = |m: &crate::discrepancy::outlook::lab::Measurement| {
                 let growth = m.prospect(&table, lack.fitted.theta.len()).growth(&known);

@@ -5,7 +5,7 @@ use super::finding::SetupFinding;
 use crate::identify::StructureModel;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::frfs::structure_study::led_astray;
 use crate::identify::levenberg_marquardt::{LeastSquares, Stopping, minimise};
 
@@ -36,15 +36,6 @@ const SETTLED: Stopping = Stopping {
     relative_decrease: 1e-6,
 };
 
-fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
-    FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
-    }
-}
-
 /// The posture that contradicts all others, where one does: `model` stands far off at `theta`, its optimum on `data`, and is right
 /// without it. `measured`: a starting point that the measured modes give, solver's scale.
 pub(super) fn posture_apart(
@@ -54,14 +45,14 @@ pub(super) fn posture_apart(
     measured: Option<&[f64]>,
 ) -> Option<PostureApart> {
     let misfit = |data: &FrfData, theta: &[f64]| {
-        let cost = problem(model, data).cost(theta).ok()?;
+        let cost = FrfProblem::likelihood(model, data).cost(theta).ok()?;
         Some((cost, cost / data.value_count() as f64))
     };
     let postures = data.measured_postures();
-    let (cost, all) = misfit(data, theta)?;
-    if postures.len() < FEWEST || !led_astray(cost, 2.0 * data.value_count() as f64) {
+    if postures.len() < FEWEST {
         return None;
     }
+    let (_, all) = misfit(data, theta)?;
     let mut worst: Vec<(f64, usize)> = postures
         .iter()
         .filter_map(|p| Some((misfit(&data.filtered(|other| other == *p), theta)?.1, *p)))
@@ -69,7 +60,13 @@ pub(super) fn posture_apart(
     worst.sort_by(|a, b| b.0.total_cmp(&a.0));
     let without = worst.into_iter().take(LEFT_OUT).filter_map(|(_, posture)| {
         let others = data.filtered(|other| other != posture);
-        let near = minimise(&problem(model, &others), theta, &model.bounds(), SETTLED).ok()?;
+        let near = minimise(
+            &FrfProblem::likelihood(model, &others),
+            theta,
+            &model.bounds(),
+            SETTLED,
+        )
+        .ok()?;
         let mut theta = near.theta;
         if led_astray(near.cost, 2.0 * others.value_count() as f64) {
             let options = Options {

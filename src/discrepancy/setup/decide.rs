@@ -22,10 +22,9 @@ impl TriedMistake {
     /// Whether it changes the data as another one does, so that nothing in them can tell the two apart.
     fn does_the_same(&self, other: &TriedMistake) -> bool {
         const ROUNDING: f64 = 1e-6;
-        let what = |t: &TriedMistake| (t.finding.kind, t.finding.place.clone());
         self.parameters == other.parameters
             && (self.chi2 - other.chi2).abs() <= ROUNDING * self.chi2.min(other.chi2)
-            && what(self) != what(other)
+            && (self.finding.kind, &self.finding.place) != (other.finding.kind, &other.finding.place)
     }
 
     /// What to do about it, and what else it may be.
@@ -157,13 +156,12 @@ pub fn decide(
         let of_one_sort = a.finding.kind == b.finding.kind || both(&LATE) || both(&LARGER);
         (a.finding.place == b.finding.place && of_one_sort) || a.does_the_same(b)
     };
-    let order = |i: usize| (RARE == tried[i].finding.kind, bics[i], i);
     let first_of_its_kind = |i: usize| {
-        let speaks = |j: usize| match tried[i].does_the_same(&tried[j]) {
-            true => order(j) < order(i),
-            false => (bics[j], j) < (bics[i], i),
+        let speaks_for_it = |j: usize| {
+            let is_rare = |k: usize| tried[i].does_the_same(&tried[j]) && tried[k].finding.kind == RARE;
+            (is_rare(j), bics[j], j) < (is_rare(i), bics[i], i)
         };
-        !(0..tried.len()).any(|j| j != i && alike(&tried[i], &tried[j]) && speaks(j))
+        !(0..tried.len()).any(|j| j != i && alike(&tried[i], &tried[j]) && speaks_for_it(j))
     };
     let weights: Vec<f64> = (0..tried.len())
         .map(|i| if first_of_its_kind(i) { weights[i] } else { 0.0 })

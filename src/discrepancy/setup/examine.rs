@@ -1,6 +1,7 @@
 //! Tries every mistake on a fitted model.
 
 use std::borrow::Cow;
+use std::cell::LazyCell;
 
 use rayon::prelude::*;
 
@@ -15,7 +16,7 @@ use super::score::Linearised;
 use super::{mistakes, numbers, readings, slips};
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::frfs::structure_study::{led_astray, small_errors, starts_elsewhere};
 use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::rest::BeyondSlips;
@@ -144,11 +145,12 @@ pub fn examine(
     let values = 2 * thin.value_count();
     let base = cost(model, &thin, theta)?;
     let all = mistakes::all(model, &thin);
-    let apart = posture_apart(model, &thin, theta, measured);
-    let mut elsewhere = match led_astray(base, values as f64) {
-        true => starts_elsewhere(model, measured),
-        false => Vec::new(),
-    };
+    let (mut elsewhere, mut apart) = (Vec::new(), None);
+    let is_astray = led_astray(base, values as f64);
+    if is_astray {
+        elsewhere = starts_elsewhere(model, measured);
+        apart = posture_apart(model, &thin, theta, measured);
+    }
     // What is wrong at one posture shows best from where the others put the model.
     elsewhere.extend(apart.as_ref().map(|a| a.theta.clone()));
     let mut trials = sized(model, &thin, theta, &elsewhere, &all)?;
@@ -157,10 +159,9 @@ pub fn examine(
     starts.extend(apart.as_ref().map(|a| a.theta.as_slice()));
     let read = readings::proposed(model, &thin, &[&starts[..], &[&nominal]].concat(), READ)?;
     trials.extend(read_trials(model, &thin, &starts, measured, &read, base)?);
-    let excess = 2.0 * base - values as f64;
     // Few lines tell how much it explains where much is to be explained.
-    let hopeless = match led_astray(base, values as f64) {
-        true => HOPELESS_SHARE * excess,
+    let hopeless = match is_astray {
+        true => HOPELESS_SHARE * (2.0 * base - values as f64),
         false => 0.0,
     };
     trials.retain(|t| 2.0 * base - t.chi2 > hopeless.max(LEAST_GAIN));
@@ -174,16 +175,9 @@ pub fn examine(
         .par_iter()
         .filter_map(|t| refined(model, data, t, measured, full_base).ok())
         .collect();
-    let mut rival = Some(rival);
-    let mut library = None;
-    let mut known = || {
-        if let Some(ask) = rival.take() {
-            library = ask();
-        }
-        library.clone()
-    };
+    let library = LazyCell::new(rival);
     let rivals = || Rivals {
-        library: known(),
+        library: LazyCell::force(&library).clone(),
         small_errors: match beyond_slips {
             Some(known) => Some(share * known.gain()),
             None => slips::gain(model, data, theta).ok(),
@@ -202,7 +196,7 @@ pub fn examine(
     if let Some(apart) = apart
         && !check.findings.iter().any(SetupFinding::is_likely)
     {
-        check.findings.extend(apart.finding(data, known().as_ref()));
+        check.findings.extend(apart.finding(data, library.as_ref()));
     }
     check
         .findings
@@ -237,16 +231,7 @@ fn thinned(data: &FrfData) -> FrfData {
 
 fn cost(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Result<f64> {
     use crate::identify::levenberg_marquardt::LeastSquares;
-    problem(model, data).cost(theta)
-}
-
-fn problem<'a>(model: &'a StructureModel, data: &'a FrfData) -> FrfProblem<'a> {
-    FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
-    }
+    FrfProblem::likelihood(model, data).cost(theta)
 }
 
 /// The mistakes with a size that promise most at `theta` and `elsewhere`, fitted on few lines from there.
@@ -353,9 +338,15 @@ fn read_trials<'a>(
             let reading = proposed.reading.as_ref();
             let data = reading.corrected(thin);
             let read = model_read(model, reading);
-            let fits = starts
-                .iter()
-                .filter_map(|start| minimise(&problem(&read, &data), start, &read.bounds(), ROUGH).ok());
+            let fits = starts.iter().filter_map(|start| {
+                minimise(
+                    &FrfProblem::likelihood(&read, &data),
+                    start,
+                    &read.bounds(),
+                    ROUGH,
+                )
+                .ok()
+            });
             let near = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
             let mut best = (near.cost, near.theta);
             // Where the baseline was led astray its old place is no start.
@@ -397,7 +388,12 @@ fn refined(
         Cause::Read(reading) => {
             let corrected = reading.corrected(data);
             let read = model_read(model, *reading);
-            let fit = minimise(&problem(&read, &corrected), &trial.theta, &read.bounds(), FINE)?;
+            let fit = minimise(
+                &FrfProblem::likelihood(&read, &corrected),
+                &trial.theta,
+                &read.bounds(),
+                FINE,
+            )?;
             let mut chi2 = 2.0 * fit.cost;
             // What explains nearly all and leaves more than noise may stand beside its optimum: it is sought as the model's was.
             if chi2 < NEARLY_ALL * base

@@ -12,7 +12,7 @@ use super::*;
 use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
 use crate::identify::StructureModel;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfData, FrfDatum};
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::{rest, rest_patterns};
 use crate::robot::RobotModel;
@@ -111,12 +111,7 @@ fn measured(model: &StructureModel, made: Option<Made>, seed: u64) -> FrfData {
 
 /// Fits the baseline as the commands do and looks for mistakes.
 fn check(model: &StructureModel, data: &FrfData) -> SetupCheck {
-    let problem = FrfProblem {
-        model,
-        data,
-        misfit: Misfit::Complex,
-        stride: 1,
-    };
+    let problem = FrfProblem::likelihood(model, data);
     let fit = minimise(&problem, &truth(model), &model.bounds(), Stopping::default()).unwrap();
     examine(model, data, &fit.theta, None, None, || None).unwrap()
 }
@@ -491,12 +486,7 @@ fn small_errors_take_what_differs_between_postures_and_no_more() {
             values,
         };
         let data = measured(&model, Some(made), 7);
-        let problem = FrfProblem {
-            model: &model,
-            data: &data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        };
+        let problem = FrfProblem::likelihood(&model, &data);
         let fit = minimise(&problem, &truth(&model), &model.bounds(), Stopping::default()).unwrap();
         let mut curves = model.rest(&fit.theta, &data).unwrap();
         let tests = rest_patterns::test(&curves);

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::Result;
 use crate::identify::frfs::calibrate::Calibration;
 use crate::identify::frfs::frf_data::FrfData;
-use crate::identify::frfs::frf_problem::{FrfProblem, Misfit};
+use crate::identify::frfs::frf_problem::FrfProblem;
 use crate::identify::frfs::rival_optima::{self, STRETCHES};
 use crate::identify::frfs::structure::StructureModel;
 use crate::identify::levenberg_marquardt::Linearisation;
@@ -36,12 +36,7 @@ impl Calibration {
             let rivals = Vec::new();
             return Ok(Calibration { rivals, ..self });
         }
-        let problem = FrfProblem {
-            model,
-            data,
-            misfit: Misfit::Complex,
-            stride: 1,
-        };
+        let problem = FrfProblem::likelihood(model, data);
         let parts = problem.by_block_and_stretch(&self.theta, STRETCHES)?;
         let of_posture = parts.iter().map(|(b, _, part)| (data.blocks[*b].posture, part));
         let of_stretch = parts.iter().map(|(_, stretch, part)| (*stretch, part));

@@ -41,6 +41,18 @@ pub struct FrfProblem<'a> {
 /// Lines one task works on: a fixed size, so that sums do not depend on the number of threads.
 const CHUNK: usize = 64;
 
+impl<'a> FrfProblem<'a> {
+    /// All lines, by likelihood.
+    pub fn likelihood(model: &'a StructureModel, data: &'a FrfData) -> Self {
+        FrfProblem {
+            model,
+            data,
+            misfit: Misfit::Complex,
+            stride: 1,
+        }
+    }
+}
+
 impl FrfProblem<'_> {
     /// Sums by block of the data and chunk of its lines, block by block; priors are left out. `size`: lines of a chunk, of a
     /// block of so many lines.

@@ -28,6 +28,12 @@ fn analyse(case: Synthetic) -> FrfModes {
     analyse_frf(&f, &h, &Settings::default()).unwrap()
 }
 
+/// Frequencies of the modes, Hz, to the next whole number.
+fn rounded_hz(found: &FrfModes) -> Vec<f64> {
+    let modes = found.modes.iter();
+    modes.map(|m| m.best().frequency_hz.round()).collect()
+}
+
 #[test]
 fn a_conjugated_frf_is_turned_and_that_is_said() {
     let (f, mut h) = Synthetic::new(3.0, 90.0, 0.1, &MODES)
@@ -419,12 +425,7 @@ fn ripples_of_a_line_are_no_modes() {
         h[line] *= Complex64::from_polar(1.03, 0.01 * k as f64);
     }
     let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
-    let at: Vec<f64> = found
-        .modes
-        .iter()
-        .map(|m| m.best().frequency_hz.round())
-        .collect();
-    assert_eq!(at, [180.0, 1010.0], "{:?}", found.remarks);
+    assert_eq!(rounded_hz(&found), [180.0, 1010.0], "{:?}", found.remarks);
     assert!(!found.undetermined.is_empty(), "{:?}", found.remarks);
     for peak in &found.undetermined {
         let frequency_hz = peak.best().frequency_hz;
@@ -449,12 +450,13 @@ fn a_resonance_narrower_than_a_line_is_no_ripple() {
         SyntheticMode::new(410.0, 1e-6, 1e-3),
     ];
     let found = analyse(Synthetic::new(5.0, 800.0, 1.0, &modes).with_noise(0.0, 1e-3, 7));
-    let at: Vec<f64> = found
-        .modes
-        .iter()
-        .map(|m| m.best().frequency_hz.round())
-        .collect();
-    assert_eq!(at, [180.0, 410.0], "{:?} {:?}", found.undetermined, found.remarks);
+    assert_eq!(
+        rounded_hz(&found),
+        [180.0, 410.0],
+        "{:?} {:?}",
+        found.undetermined,
+        found.remarks
+    );
 }
 
 /// A disturbance of one line, well above what is around it.
@@ -467,10 +469,5 @@ fn one_line_that_stands_out_is_no_mode() {
     let line = f.iter().position(|f| *f == 410.0).unwrap();
     h[line] *= 3.0;
     let found = analyse_frf(&f, &h, &Settings::default()).unwrap();
-    let at: Vec<f64> = found
-        .modes
-        .iter()
-        .map(|m| m.best().frequency_hz.round())
-        .collect();
-    assert_eq!(at, [180.0], "{:?}", found.remarks);
+    assert_eq!(rounded_hz(&found), [180.0], "{:?}", found.remarks);
 }

@@ -2,6 +2,7 @@
 
 use super::decide::Rival;
 use super::finding::SetupFinding;
+use crate::discrepancy::comparison::error_sums::Sums;
 use crate::identify::StructureModel;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
@@ -25,6 +26,8 @@ const FEWEST: usize = 3;
 const LEFT_OUT: usize = 2;
 /// Share of what stands above the noise that is left without the posture, at most.
 const LEFT: f64 = 0.1;
+/// Times the others' error over the signal that the posture's has at least: noise that is understated makes no contradiction.
+const FURTHER_OFF: f64 = 2.0;
 /// Probability that something was different at a posture that stands apart, and is no physics of all postures that shows at one alone.
 const SURE: f64 = 0.8;
 /// Share of what stands above the noise from which on an effect of the library explains it.
@@ -82,7 +85,21 @@ pub(super) fn posture_apart(
         Some(PostureApart { posture, theta, left })
     });
     let best = without.min_by(|a, b| a.left[0].total_cmp(&b.left[0]))?;
-    (best.left[0] - 1.0 < LEFT * (all - 1.0)).then_some(best)
+    let nrms = |own: bool| nrms(model, &data.filtered(|p| (p == best.posture) == own), &best.theta);
+    let stands_apart = best.left[0] - 1.0 < LEFT * (all - 1.0) && nrms(true)? > FURTHER_OFF * nrms(false)?;
+    stands_apart.then_some(best)
+}
+
+/// Error over the signal.
+fn nrms(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Option<f64> {
+    let predicted = model.predict(theta, data).ok()?;
+    let mut sums = Sums::default();
+    for ((_, frf), curve) in data.frfs().zip(&predicted) {
+        for ((m, h), std) in curve.iter().zip(&frf.receptance).zip(&frf.noise_std) {
+            sums.add(Sums::of_line(*m, *h, *std));
+        }
+    }
+    sums.measured_nrms()
 }
 
 impl PostureApart {

@@ -284,6 +284,22 @@ fn a_posture_that_contradicts_all_others_is_told() {
     assert!(check_without(&model, &data, 2).findings.is_empty());
 }
 
+/// The noise of few lines may be understated: a misfit of nine times the noise there, and no greater error than elsewhere.
+#[test]
+fn a_posture_with_understated_noise_contradicts_none() {
+    let model = model();
+    let mut data = measured(&model, None, 10);
+    for frf in &mut Arc::make_mut(&mut data.blocks[2]).frfs {
+        frf.noise_std.iter_mut().for_each(|std| *std /= 3.0);
+    }
+    let check = check(&model, &data);
+    assert!(
+        check.findings.iter().all(|f| f.kind != "posture-apart"),
+        "{:?}",
+        check.findings
+    );
+}
+
 /// Hits and responses along X and Y of the tool alone, exchanged at one posture.
 #[test]
 fn axes_exchanged_at_one_posture_are_found() {

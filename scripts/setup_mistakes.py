@@ -30,6 +30,11 @@ FIELDS = ["seed", "tier", "kind", "where", "value", "said", "said_where", "said_
           "named", "within", "verdict", "seconds"]  # fmt: skip
 
 
+def size(curves):
+    """Root of the sum of squares of all values."""
+    return math.sqrt(sum(abs(h) ** 2 for curve in curves.values() for h in curve))
+
+
 class Campaign:
     """A simulated campaign in memory: text of campaign.toml and per posture the lines with {channel: [complex]}."""
 
@@ -47,6 +52,7 @@ class Campaign:
                 for i, name in enumerate(names)
             }
             self.files[path.stem] = (lines, curves)
+        self.undamaged = {name: size(curves) for name, (_, curves) in self.files.items()}
 
     def change(self, posture, function):
         """function(channel, frequency, value) for every value of a posture (None: of all)."""
@@ -56,11 +62,12 @@ class Campaign:
                     curves[channel] = [function(channel, f, h) for f, h in zip(lines, curve)]
 
     def add_noise(self, draw, relative, floor):
-        for lines, curves in self.files.values():
+        for name, (lines, curves) in self.files.items():
+            # In another quantity's units the floor is so many times larger or smaller as well.
+            times = size(curves) / self.undamaged.get(name, size(curves))
+            least = floor if 0.01 < times < 100.0 else floor * times
             for channel, curve in curves.items():
-                rms = math.sqrt(sum(abs(h) ** 2 for h in curve) / len(curve))
-                # A channel without units of displacement has its floor in its own size.
-                scale = [math.hypot(relative * abs(h), floor if rms < 1e-3 else relative * rms) for h in curve]
+                scale = [math.hypot(relative * abs(h), least) for h in curve]
                 curves[channel] = [
                     h + s * complex(draw.gauss(0, 1), draw.gauss(0, 1)) / math.sqrt(2) for h, s in zip(curve, scale)
                 ]

@@ -97,6 +97,7 @@ impl StructureCase {
         warnings.extend(noticed);
         warnings.extend(baseline.robot.spec.guesses_told());
         let data = frf_data(campaign, &baseline.robot, set)?;
+        warnings.extend(drowned(&data));
         let mut settled = false;
         let model = match revisions.last() {
             Some(current) => {
@@ -182,6 +183,31 @@ impl StructureCase {
     }
 }
 
+/// Noise over what was measured from which on hardly anything of the robot can be in it: scatter without a response gives 1.
+const DROWNED: f64 = 0.9;
+
+/// Which postures' FRFs are hardly more than noise; `None` where none are.
+fn drowned(data: &FrfData) -> Option<String> {
+    let postures = data.measured_postures();
+    let noise = |posture: usize| data.filtered(|p| p == posture).noise_floor_nrms();
+    let told: Vec<String> = postures
+        .iter()
+        .map(|posture| (*posture, noise(*posture)))
+        .filter(|(_, noise)| *noise > DROWNED)
+        .map(|(posture, noise)| format!("{} ({:.0} %)", data.posture_ids[posture], 100.0 * noise))
+        .collect();
+    let which = match told.len() {
+        0 => return None,
+        all if all == postures.len() => "all postures".to_string(),
+        1 => format!("posture {}", told[0]),
+        _ => format!("postures {}", told.join(", ")),
+    };
+    Some(format!(
+        "the FRFs of {which} are hardly more than noise: nothing of the robot can be told from them; check their unit and \
+         quantity (`lobestone inspect`), or hit harder and average more hits"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use num_complex::Complex64;
@@ -226,6 +252,41 @@ mod tests {
             frf.receptance_m_per_n = exact.iter().map(noisy).collect();
         }
         frfs
+    }
+
+    /// Scatter without a response, as a wrong unit leaves it where the signal ends below the noise.
+    #[test]
+    fn postures_of_noise_alone_are_told() {
+        let postures: Vec<Posture> = [0, 1]
+            .map(|i| Posture {
+                id: format!("p{i}"),
+                joints_deg: TAP_POSTURES[i].to_vec(),
+            })
+            .into();
+        let points = [Point {
+            node: 1,
+            body: BodyRef::Tool,
+            position_m: [0.0; 3],
+            axes: AxesRef::Base,
+        }];
+        let mut frfs = measured(&postures, &points);
+        let told = |frfs: &[MeasuredFrf]| {
+            let case = StructureCase::new(irb6640(), &postures, points.to_vec(), frfs.to_vec()).unwrap();
+            drowned(&case.data)
+        };
+        assert_eq!(told(&frfs), None);
+        let mut random = ChaCha8Rng::seed_from_u64(7);
+        let mut drown = |frf: &mut MeasuredFrf| {
+            let mut noise = || 1e-8 * random.random_range(-1.0..1.0);
+            let lines = frf.receptance_m_per_n.iter_mut();
+            lines.for_each(|h| *h = Complex64::new(noise(), noise()));
+        };
+        frfs[6..].iter_mut().for_each(&mut drown);
+        let one = told(&frfs).unwrap();
+        assert!(one.starts_with("the FRFs of posture p1 ("), "{one}");
+        frfs[..6].iter_mut().for_each(&mut drown);
+        let all = told(&frfs).unwrap();
+        assert!(all.starts_with("the FRFs of all postures are"), "{all}");
     }
 
     #[test]

@@ -428,6 +428,29 @@ fn mistyped_angles_are_found() {
     );
 }
 
+/// One quantity taken for another in all files: the model is led far away, where another power looks nearer than the right one.
+#[test]
+fn another_quantity_in_all_files_is_found() {
+    let model = model();
+    for power in [-2, 2] {
+        let mut data = measured(&model, None, 5);
+        for block in &mut data.blocks {
+            let block = Arc::make_mut(block);
+            for frf in &mut block.frfs {
+                let lines = block.frequency_hz.iter().zip(&mut frf.receptance);
+                for ((f, h), std) in lines.zip(&mut frf.noise_std) {
+                    let factor = Complex64::new(0.0, std::f64::consts::TAU * f).powi(power);
+                    *h *= factor;
+                    *std *= factor.norm();
+                }
+            }
+        }
+        let check = check(&model, &data);
+        let found = check.likely().unwrap_or_else(|| panic!("{:?}", check.findings));
+        assert_eq!((found.kind, found.value), ("quantity", Some(f64::from(power))));
+    }
+}
+
 /// Apparent mass where accelerance is expected: both hold two derivatives.
 #[test]
 fn force_per_motion_is_found() {

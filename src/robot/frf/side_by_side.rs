@@ -1,5 +1,5 @@
 //! Small complex systems, solved so often that a library's blocking and memory would take longer than the arithmetic; those of
-//! a frequency alone, or of four frequencies side by side.
+//! a frequency alone, or of eight frequencies side by side.
 
 use std::ops::{AddAssign, Mul, SubAssign};
 
@@ -68,11 +68,12 @@ fn eliminate<T: Copy + Mul<Output = T> + SubAssign>(
     true
 }
 
-/// Systems solved side by side: as many numbers as a vector of AVX2 holds.
-pub(super) const LANES: usize = 4;
+/// Systems solved side by side: as many numbers as a vector of AVX-512 holds; smaller ones take them one after the other.
+pub(super) const LANES: usize = 8;
 
-/// A complex number of each of the systems.
+/// A complex number of each of the systems. (Aligned so that no vector lies across two lines of the cache.)
 #[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
 pub(super) struct Lanes {
     pub(super) re: [f64; LANES],
     pub(super) im: [f64; LANES],
@@ -180,27 +181,26 @@ pub(super) fn three<'a>(of: impl Fn(usize) -> &'a [Lanes], first: usize, count: 
 #[inline(always)]
 pub(super) fn dots<S: Simd>(simd: S, a: &[Lanes], b: [&[Lanes]; 3]) -> [Lanes; 3] {
     let b = b.map(|b| &b[..a.len()]);
-    if S::F64_LANES != LANES {
-        return b.map(|b| dot(a, b));
-    }
-    // By hand: the compiler keeps these sums in memory.
-    let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[0];
-    let (mut re, mut im) = ([simd.splat_f64s(0.0); 3], [simd.splat_f64s(0.0); 3]);
-    for (i, a) in a.iter().enumerate() {
-        let (a_re, a_im) = (vector(&a.re), vector(&a.im));
-        let minus = simd.neg_f64s(a_im);
-        for k in 0..3 {
-            let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
-            re[k] = simd.mul_add_e_f64s(a_re, b_re, re[k]);
-            re[k] = simd.mul_add_e_f64s(minus, b_im, re[k]);
-            im[k] = simd.mul_add_e_f64s(a_re, b_im, im[k]);
-            im[k] = simd.mul_add_e_f64s(a_im, b_re, im[k]);
-        }
-    }
     let mut sums = [Lanes::default(); 3];
-    for (k, sum) in sums.iter_mut().enumerate() {
-        S::as_mut_simd_f64s(&mut sum.re).0[0] = re[k];
-        S::as_mut_simd_f64s(&mut sum.im).0[0] = im[k];
+    // By hand: the compiler keeps these sums in memory.
+    for part in 0..LANES / S::F64_LANES {
+        let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[part];
+        let (mut re, mut im) = ([simd.splat_f64s(0.0); 3], [simd.splat_f64s(0.0); 3]);
+        for (i, a) in a.iter().enumerate() {
+            let (a_re, a_im) = (vector(&a.re), vector(&a.im));
+            let minus = simd.neg_f64s(a_im);
+            for k in 0..3 {
+                let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
+                re[k] = simd.mul_add_e_f64s(a_re, b_re, re[k]);
+                re[k] = simd.mul_add_e_f64s(minus, b_im, re[k]);
+                im[k] = simd.mul_add_e_f64s(a_re, b_im, im[k]);
+                im[k] = simd.mul_add_e_f64s(a_im, b_re, im[k]);
+            }
+        }
+        for (k, sum) in sums.iter_mut().enumerate() {
+            S::as_mut_simd_f64s(&mut sum.re).0[part] = re[k];
+            S::as_mut_simd_f64s(&mut sum.im).0[part] = im[k];
+        }
     }
     sums
 }
@@ -215,31 +215,25 @@ pub(super) fn real_dots<S: Simd, const R: usize>(
     let n = a.first().map_or(0, |a| a.len());
     let (a, b) = (a.map(|a| &a[..n]), b.map(|b| &b[..n]));
     let mut sums = [[Lanes::default(); 3]; R];
-    if S::F64_LANES != LANES {
-        for (sums, a) in sums.iter_mut().zip(a) {
-            for (sum, b) in sums.iter_mut().zip(b) {
-                a.iter().zip(b).for_each(|(a, b)| *sum += b.times(*a));
-            }
-        }
-        return sums;
-    }
     // By hand: the compiler keeps these sums in memory.
-    let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[0];
-    let (mut re, mut im) = ([[simd.splat_f64s(0.0); 3]; R], [[simd.splat_f64s(0.0); 3]; R]);
-    for i in 0..n {
-        let factors = a.map(|a| simd.splat_f64s(a[i]));
-        for k in 0..3 {
-            let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
-            for r in 0..R {
-                re[r][k] = simd.mul_add_e_f64s(factors[r], b_re, re[r][k]);
-                im[r][k] = simd.mul_add_e_f64s(factors[r], b_im, im[r][k]);
+    for part in 0..LANES / S::F64_LANES {
+        let vector = |values: &[f64; LANES]| S::as_simd_f64s(values).0[part];
+        let (mut re, mut im) = ([[simd.splat_f64s(0.0); 3]; R], [[simd.splat_f64s(0.0); 3]; R]);
+        for i in 0..n {
+            let factors = a.map(|a| simd.splat_f64s(a[i]));
+            for k in 0..3 {
+                let (b_re, b_im) = (vector(&b[k][i].re), vector(&b[k][i].im));
+                for r in 0..R {
+                    re[r][k] = simd.mul_add_e_f64s(factors[r], b_re, re[r][k]);
+                    im[r][k] = simd.mul_add_e_f64s(factors[r], b_im, im[r][k]);
+                }
             }
         }
-    }
-    for r in 0..R {
-        for k in 0..3 {
-            S::as_mut_simd_f64s(&mut sums[r][k].re).0[0] = re[r][k];
-            S::as_mut_simd_f64s(&mut sums[r][k].im).0[0] = im[r][k];
+        for r in 0..R {
+            for k in 0..3 {
+                S::as_mut_simd_f64s(&mut sums[r][k].re).0[part] = re[r][k];
+                S::as_mut_simd_f64s(&mut sums[r][k].im).0[part] = im[r][k];
+            }
         }
     }
     sums
@@ -369,11 +363,23 @@ mod tests {
         // Two systems whose rows stand the other way round.
         let (one, zero) = (Complex64::ONE, Complex64::ZERO);
         let (straight, crossed) = ([one, zero, zero, one], [zero, one, one, zero]);
-        let mut a = beside([&straight, &crossed, &straight, &crossed]);
+        let mut a = beside(std::array::from_fn(|lane| {
+            if lane % 2 == 0 {
+                straight.as_slice()
+            } else {
+                &crossed
+            }
+        }));
         let mut b = beside([&[one, one]; LANES]);
         assert!(!solve_side_by_side(2, &mut a, &mut b));
         let not_a_number = [Complex64::new(f64::NAN, 0.0); 4];
-        let mut a = beside([&straight, &straight, &straight, &not_a_number]);
+        let mut a = beside(std::array::from_fn(|lane| {
+            if lane == 3 {
+                not_a_number.as_slice()
+            } else {
+                &straight
+            }
+        }));
         assert!(!solve_side_by_side(2, &mut a, &mut b));
     }
 }

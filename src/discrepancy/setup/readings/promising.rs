@@ -60,7 +60,7 @@ pub fn proposed(
     // The same reading is proposed from several places.
     keep_first_of_each(&mut all, |p| {
         let finding = p.reading.finding(data, &model.points);
-        (finding.kind, finding.place)
+        (finding.kind, finding.place, finding.value.map(f64::to_bits))
     });
     Ok(all)
 }

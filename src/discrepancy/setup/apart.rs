@@ -2,7 +2,7 @@
 
 use super::decide::Rival;
 use super::finding::SetupFinding;
-use crate::discrepancy::comparison::error_sums::Sums;
+use crate::discrepancy::comparison::compare::FrfComparison;
 use crate::identify::StructureModel;
 use crate::identify::frfs::calibrate::{Options, calibrate};
 use crate::identify::frfs::frf_data::FrfData;
@@ -85,21 +85,13 @@ pub(super) fn posture_apart(
         Some(PostureApart { posture, theta, left })
     });
     let best = without.min_by(|a, b| a.left[0].total_cmp(&b.left[0]))?;
-    let nrms = |own: bool| nrms(model, &data.filtered(|p| (p == best.posture) == own), &best.theta);
+    let nrms = |own: bool| {
+        let part = data.filtered(|p| (p == best.posture) == own);
+        let predicted = model.predict(&best.theta, &part).ok()?;
+        Some(FrfComparison::new(&part, &model.points, &predicted).totals.nrms)
+    };
     let stands_apart = best.left[0] - 1.0 < LEFT * (all - 1.0) && nrms(true)? > FURTHER_OFF * nrms(false)?;
     stands_apart.then_some(best)
-}
-
-/// Error over the signal.
-fn nrms(model: &StructureModel, data: &FrfData, theta: &[f64]) -> Option<f64> {
-    let predicted = model.predict(theta, data).ok()?;
-    let mut sums = Sums::default();
-    for ((_, frf), curve) in data.frfs().zip(&predicted) {
-        for ((m, h), std) in curve.iter().zip(&frf.receptance).zip(&frf.noise_std) {
-            sums.add(Sums::of_line(*m, *h, *std));
-        }
-    }
-    sums.measured_nrms()
 }
 
 impl PostureApart {

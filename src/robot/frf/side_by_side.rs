@@ -68,7 +68,7 @@ fn eliminate<T: Copy + Mul<Output = T> + SubAssign>(
     true
 }
 
-/// Systems solved side by side: as many numbers as a vector of AVX-512 holds; smaller ones take them one after the other.
+/// Systems solved side by side: as many numbers as a vector of AVX-512 holds. Narrower vectors take them part by part.
 pub(super) const LANES: usize = 8;
 
 /// A complex number of each of the systems. (Aligned so that no vector lies across two lines of the cache.)
@@ -363,23 +363,14 @@ mod tests {
         // Two systems whose rows stand the other way round.
         let (one, zero) = (Complex64::ONE, Complex64::ZERO);
         let (straight, crossed) = ([one, zero, zero, one], [zero, one, one, zero]);
-        let mut a = beside(std::array::from_fn(|lane| {
-            if lane % 2 == 0 {
-                straight.as_slice()
-            } else {
-                &crossed
-            }
-        }));
+        let in_turn = [&straight[..], &crossed];
+        let mut a = beside(std::array::from_fn(|lane| in_turn[lane % 2]));
         let mut b = beside([&[one, one]; LANES]);
         assert!(!solve_side_by_side(2, &mut a, &mut b));
         let not_a_number = [Complex64::new(f64::NAN, 0.0); 4];
-        let mut a = beside(std::array::from_fn(|lane| {
-            if lane == 3 {
-                not_a_number.as_slice()
-            } else {
-                &straight
-            }
-        }));
+        let mut systems = [&straight[..]; LANES];
+        systems[3] = &not_a_number;
+        let mut a = beside(systems);
         assert!(!solve_side_by_side(2, &mut a, &mut b));
     }
 }

@@ -2,6 +2,8 @@
 //! from several starting points, and judged by likelihood, by folds left out of the fit, and by whether what it leaves
 //! over is noise. The same loop for every [`Study`].
 
+mod several;
+
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -9,17 +11,16 @@ use super::candidate::{BaselineFit, EffectCandidate, share_taken};
 use super::diagnosis::Diagnosis;
 use super::faint::{self, Linear};
 use super::ranking::keep_first_of_each;
-use super::verdict::{self, DiagnosisVerdict, EffectSet};
+use super::verdict::{self, DiagnosisVerdict};
 use crate::Result;
 use crate::effects::Site;
-use crate::identify::first_size::linear_size;
 use crate::identify::frfs::calibrate::{Calibration, estimates};
-use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
     Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, from_possible_size,
-    held_out, own_starts, rescue, try_again, try_effect, try_effects, vanished,
+    held_out, own_starts, rescue, try_again, try_effect, try_effects, vanished, with_those_gone_back,
 };
 use crate::progress::Progress;
 
@@ -46,47 +47,8 @@ const WITHIN_SLIPS: f64 = 5.0;
 const LED_AWAY: usize = 4;
 /// Candidates that are fitted again from the best one's baseline.
 const SHARED: usize = 6;
-/// Candidates whose combination with every other one is tried where none explains the data alone.
-const PAIR_LEADERS: usize = 2;
 /// Share of the excess misfit that one effect of a pair must explain alone: where none does, the search is hopeless.
 const PAIR_SHARE: f64 = 0.3;
-/// Processor time that looks at pairs may take, s (see [`Study::work_s`]), the evaluations with derivatives of one look, and
-/// the pairs that are looked at in any case.
-const PAIRS_BUDGET_S: f64 = 4.0;
-const LOOK_EVALUATIONS: f64 = 20.0;
-const FEWEST_PAIRS: usize = 12;
-/// Pairs to which a third effect is added, where they leave so many standard deviations of χ² above noise.
-const THREE_LEADERS: usize = 2;
-const PLAIN_SIGMAS: f64 = 5.0;
-
-/// How many effects are tried besides others.
-#[derive(Clone, Copy)]
-struct Search {
-    /// Effects, each with all its discrete choices.
-    looked_at: usize,
-    /// Followed to their end on the coarse view, …
-    settled: usize,
-    /// … besides those that would gain most were the response linear in their sizes, …
-    linear: usize,
-    /// … and of those on all data.
-    refined: usize,
-}
-
-const PAIRS: Search = Search {
-    looked_at: usize::MAX,
-    settled: 4,
-    linear: 2,
-    refined: 2,
-};
-const THREES: Search = Search {
-    looked_at: 16,
-    settled: 2,
-    linear: 2,
-    refined: 1,
-};
-
-/// Share of what stands above the noise that three effects must take for their fit to be tried harder.
-const NEARLY_ALL: f64 = 0.9;
 
 const REFINE: Stopping = Stopping {
     max_iterations: 25,
@@ -141,18 +103,6 @@ fn put_among<D: Modelled>(refined: &mut Vec<Tried<D>>, found: impl IntoIterator<
         }
     }
     refined.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-}
-
-/// Several effects fitted together.
-struct Together<S: Study> {
-    /// Each with the number of its parameters, in their order.
-    parts: Vec<(InstanceOf<S>, usize)>,
-    model: ModelOf<S>,
-    theta: Vec<f64>,
-    /// On all data.
-    cost: f64,
-    /// No size at the end of its range, none that cannot be. What is missing still may drive sizes there.
-    possible: bool,
 }
 
 struct Engine<'a, S: Study> {
@@ -567,7 +517,8 @@ impl<'a, S: Study> Engine<'a, S> {
         let mut tried = match before {
             None => {
                 let bases = [base.theta.clone(), model.nominal_theta()];
-                try_effects(study, model, &self.instances, &bases, &self.hints, step)
+                let tried = try_effects(study, model, &self.instances, &bases, &self.hints, step);
+                self.or_with_those_back(tried, base)
             }
             Some(before) => try_again(study, model, before, &base.theta, &self.hints, step),
         };
@@ -612,6 +563,30 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         tried.sort_by(by_cost);
         Ok((tried, base_start))
+    }
+
+    /// `tried` from where the model stands, each the better of that and of the same from where parameters that are gone are back.
+    fn or_with_those_back(&self, tried: Vec<TriedOf<S>>, base: &Fit) -> Vec<TriedOf<S>> {
+        let Some(back) = with_those_gone_back(self.model, &base.theta) else {
+            return tried;
+        };
+        let again = try_effects(
+            self.study,
+            self.model,
+            &self.instances,
+            &[back],
+            &self.hints,
+            || (),
+        );
+        let of = |instance: &InstanceOf<S>| again.iter().find(|a| a.instance == *instance);
+        let known: Vec<InstanceOf<S>> = tried.iter().map(|t| t.instance).collect();
+        let better = |t: TriedOf<S>| match of(&t.instance) {
+            Some(again) if again.fit.cost < t.fit.cost => again.clone(),
+            _ => t,
+        };
+        let mut best: Vec<TriedOf<S>> = tried.into_iter().map(better).collect();
+        best.extend(again.iter().filter(|a| !known.contains(&a.instance)).cloned());
+        best
     }
 
     /// The leaders of `tried` (best first), fitted to all data, best first.
@@ -823,287 +798,6 @@ impl<'a, S: Study> Engine<'a, S> {
             refined,
             theta: fit.theta.clone(),
             model: model.clone(),
-        })
-    }
-
-    /// The effects that explain most together: the best pair with one that leads, and where every pair leaves more than noise of what
-    /// is plain, the best three. Besides, what came last into those that leave least, alone.
-    #[allow(clippy::type_complexity)]
-    fn best_set(
-        &self,
-        candidates: &[CandidateOf<S>],
-        leading: &[bool],
-        evidence: &Evidence,
-    ) -> Result<(Option<EffectSet>, [usize; 2], Option<TriedOf<S>>)> {
-        let mut counts = [0, 0];
-        let mut best: Option<EffectSet> = None;
-        let answers = |best: &Option<EffectSet>| best.as_ref().is_some_and(|b| b.odds_against() < 1.0);
-        let leaders = candidates
-            .iter()
-            .zip(leading)
-            .filter(|(_, leads)| **leads)
-            .map(|(c, _)| c)
-            .take(PAIR_LEADERS);
-        let leaders: Vec<Together<S>> = leaders
-            .map(|c| Together {
-                parts: vec![(c.instance, c.parameters.len())],
-                model: c.model.clone(),
-                theta: c.theta.clone(),
-                cost: 0.5 * (evidence.base_chi2 - c.gain),
-                possible: true,
-            })
-            .collect();
-        let labels: Vec<String> = candidates.iter().map(EffectCandidate::label).collect();
-        let mut pairs: Vec<(Together<S>, Vec<String>)> = Vec::new();
-        for leader in &leaders {
-            // Those that explain most alone come first, should the budget not reach to the end.
-            let linear = self.by_linear_gain(leader);
-            let (found, promising) = self.with_another(leader, &labels, linear, PAIRS, &mut counts)?;
-            for pair in found {
-                self.keep_better(&mut best, &pair, (candidates, leading), evidence)?;
-                pairs.push((pair, promising.clone()));
-            }
-            // Effects that leave only noise are the answer; other leaders cannot do better.
-            if answers(&best) {
-                let last = self.last_alone(pairs.iter().map(|(pair, _)| pair))?;
-                return Ok((best, counts, last));
-            }
-        }
-        pairs.sort_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
-        // Both leaders may have ended at the same two.
-        keep_first_of_each(&mut pairs, |(pair, _)| {
-            let mut labels = self.labels(&pair.parts);
-            labels.sort();
-            labels
-        });
-        let plain = pairs.first().is_some_and(|(pair, _)| {
-            let freedom = self.freedom(&pair.model, Extent::Full);
-            2.0 * pair.cost - freedom > PLAIN_SIGMAS * (2.0 * freedom).sqrt()
-        });
-        let mut threes = Vec::new();
-        for (pair, promising) in pairs.iter().take(if plain { THREE_LEADERS } else { 0 }) {
-            let linear = self.by_linear_gain(pair);
-            let order = self.by_turns(&linear, promising);
-            let (found, _) = self.with_another(pair, &order, linear, THREES, &mut [0, 0])?;
-            for three in found {
-                self.keep_better(&mut best, &three, (candidates, leading), evidence)?;
-                threes.push(three);
-            }
-            if answers(&best) {
-                break;
-            }
-        }
-        let last = self.last_alone(pairs.iter().map(|(pair, _)| pair).chain(&threes))?;
-        if answers(&best) {
-            return Ok((best, counts, last));
-        }
-        // So many parameters at once may have stopped on their way: what explains nearly all is fitted as the model was, where that
-        // does not take long.
-        threes.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let above = evidence.base_chi2 - self.freedom(self.model, Extent::Full);
-        if let Some(three) = threes
-            .first()
-            .filter(|three| evidence.base_chi2 - 2.0 * three.cost > NEARLY_ALL * above)
-            .filter(|three| self.looks_affordable(&three.model) >= FEWEST_PAIRS)
-        {
-            let fit = fit_as_a_model(self.study, &three.model, &three.theta, REFINE)?;
-            let fresh = self.together(three.parts.clone(), three.model.clone(), fit)?;
-            self.keep_better(&mut best, &fresh, (candidates, leading), evidence)?;
-        }
-        Ok((best, counts, last))
-    }
-
-    /// Of the set that leaves least, the effect that came last, without the others: they may only have led to where it explains all.
-    fn last_alone<'t>(&self, sets: impl Iterator<Item = &'t Together<S>>) -> Result<Option<TriedOf<S>>>
-    where
-        S: 't,
-    {
-        let Some(best) = sets.min_by(|a, b| a.cost.total_cmp(&b.cost)) else {
-            return Ok(None);
-        };
-        let Some((instance, own)) = best.parts.last() else {
-            return Ok(None);
-        };
-        let (front, last) = (
-            &best.theta[..self.base_count],
-            &best.theta[best.theta.len() - own..],
-        );
-        let start = [front, last].concat();
-        fit_from(self.study, self.model, instance, &start, View::FULL, REFINE).map(Some)
-    }
-
-    /// Effects besides those of `leader` at the sizes that they would have were the response linear in them, most gain first.
-    fn by_linear_gain(&self, leader: &Together<S>) -> Vec<Linear<S>> {
-        let study = self.study;
-        let taken = self.labels(&leader.parts);
-        let cost = study.problem(&leader.model, View::COARSE).cost(&leader.theta);
-        let cost = cost.unwrap_or(f64::INFINITY);
-        let mut gains: Vec<Linear<S>> = self
-            .instances
-            .par_iter()
-            .filter(|instance| !taken.contains(&self.label(instance)))
-            .filter_map(|instance| {
-                let model = study.extend(&leader.model, instance);
-                let size = linear_size(&study.problem(&model, View::COARSE), &model, &leader.theta)?;
-                Linear::new(*instance, size, cost)
-            })
-            .collect();
-        gains.sort_by(|a, b| b.size.gain.total_cmp(&a.size.gain));
-        gains
-    }
-
-    /// Labels of further effects: by turns the next of `linear` and of `promising`.
-    fn by_turns(&self, linear: &[Linear<S>], promising: &[String]) -> Vec<String> {
-        let gains: Vec<String> = linear.iter().map(|l| self.label(&l.instance)).collect();
-        let mut order: Vec<String> = Vec::new();
-        for k in 0..gains.len().max(promising.len()) {
-            for label in gains.get(k).into_iter().chain(promising.get(k)) {
-                if !order.contains(label) {
-                    order.push(label.clone());
-                }
-            }
-        }
-        order
-    }
-
-    /// `leader` with each other effect, in the order of `labels`: the best of them and of `linear` fitted to all data,
-    /// best first, and the labels of all by what they promise. `counts`: how many were tried, of how many.
-    #[allow(clippy::type_complexity)]
-    fn with_another(
-        &self,
-        leader: &Together<S>,
-        labels: &[String],
-        linear: Vec<Linear<S>>,
-        effort: Search,
-        counts: &mut [usize; 2],
-    ) -> Result<(Vec<Together<S>>, Vec<String>)> {
-        let study = self.study;
-        let bases = [leader.theta.clone()];
-        let hints = study.hints(&leader.model, &leader.theta)?;
-        let taken = self.labels(&leader.parts);
-        let standing = |instance: &InstanceOf<S>| {
-            let label = self.label(instance);
-            labels.iter().position(|l| *l == label).unwrap_or(labels.len())
-        };
-        let mut others: Vec<&InstanceOf<S>> = self
-            .instances
-            .iter()
-            .filter(|i| !taken.contains(&self.label(i)))
-            .collect();
-        others.sort_by_key(|i| standing(i));
-        let affordable = self.looks_affordable(&leader.model);
-        counts[1] += others.len();
-        others.truncate(affordable.max(FEWEST_PAIRS));
-        others.retain(|i| standing(i) < effort.looked_at);
-        counts[0] += others.len();
-        let progress = Progress::new("trying several effects together", others.len());
-        let mut tried: Vec<TriedOf<S>> = others
-            .par_iter()
-            .filter_map(|other| {
-                let tried = try_effect(study, &leader.model, other, &bases, &hints, Effort::Look);
-                progress.step();
-                tried
-            })
-            .collect();
-        tried.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-        let promising = tried.iter().map(|t| self.label(&t.instance)).collect();
-        tried.truncate(effort.settled);
-        // A look may be too short for what is faint beside the leader.
-        let missed = linear.into_iter();
-        let missed = missed.filter(|linear| tried.iter().all(|t| t.instance != linear.instance));
-        let missed: Vec<TriedOf<S>> = missed
-            .take(effort.linear)
-            .filter_map(|Linear { instance, size }| {
-                let (view, briefly) = (View::COARSE, REFIT_BRIEFLY);
-                fit_from(study, &leader.model, &instance, &size.theta, view, briefly).ok()
-            })
-            .collect();
-        tried.extend(missed);
-        let follow = |tried: Vec<TriedOf<S>>, view: View| -> Result<Vec<TriedOf<S>>> {
-            let mut settled: Vec<TriedOf<S>> = tried
-                .into_par_iter()
-                .map(|t| {
-                    let fit = self.minimise(&t.model, view, &t.fit.theta, REFINE)?;
-                    Ok(Tried { fit, ..t })
-                })
-                .collect::<Result<_>>()?;
-            settled.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-            Ok(settled)
-        };
-        let mut near = follow(tried, View::COARSE)?;
-        near.truncate(effort.refined);
-        let mut found = Vec::new();
-        for t in follow(near, View::FULL)? {
-            let first = leader.model.parameters.len();
-            let mut parts = leader.parts.clone();
-            parts.push((t.instance, t.model.parameters.len() - first));
-            found.push(self.together(parts, t.model, t.fit)?);
-        }
-        Ok((found, promising))
-    }
-
-    /// Puts a set of effects in the place of `best` where it leaves less.
-    fn keep_better(
-        &self,
-        best: &mut Option<EffectSet>,
-        together: &Together<S>,
-        (candidates, leading): (&[CandidateOf<S>], &[bool]),
-        evidence: &Evidence,
-    ) -> Result<()> {
-        let reduced_chi2 = 2.0 * together.cost / self.freedom(&together.model, Extent::Full);
-        if !together.possible || best.as_ref().is_some_and(|b| b.reduced_chi2 <= reduced_chi2) {
-            return Ok(());
-        }
-        let mut labels = self.labels(&together.parts);
-        // The strongest of them alone is named first.
-        let place = |label: &String| candidates.iter().position(|c| c.label() == *label);
-        let standing = labels.iter().map(place);
-        let strongest = standing.flatten().filter(|i| leading[*i]).min();
-        let Some(strongest) = strongest else { return Ok(()) };
-        labels.retain(|label| *label != candidates[strongest].label());
-        let mut rest = self.study.rest(&together.model, &together.theta)?;
-        rest.beyond_slips = self.beyond_slips(&rest, &together.model, &together.theta)?;
-        *best = Some(EffectSet {
-            strongest,
-            others: labels,
-            parameters: together.parts.iter().map(|(_, count)| count).sum(),
-            gain: evidence.base_chi2 - 2.0 * together.cost,
-            reduced_chi2,
-            rest,
-        });
-        Ok(())
-    }
-
-    fn labels(&self, parts: &[(InstanceOf<S>, usize)]) -> Vec<String> {
-        parts.iter().map(|(instance, _)| self.label(instance)).collect()
-    }
-
-    /// Looks at further effects of `model` that fit into the budget.
-    fn looks_affordable(&self, model: &ModelOf<S>) -> usize {
-        let look_s = LOOK_EVALUATIONS * self.study.work_s(model, Extent::Glance);
-        (PAIRS_BUDGET_S / look_s.max(1e-9)) as usize
-    }
-
-    /// Several effects fitted to all data.
-    fn together(
-        &self,
-        parts: Vec<(InstanceOf<S>, usize)>,
-        model: ModelOf<S>,
-        fit: Fit,
-    ) -> Result<Together<S>> {
-        let all = estimates(&model.parameters, &fit, 1.0)?;
-        let mut start = self.base_count;
-        let impossible = parts.iter().any(|(instance, count)| {
-            let own = start..start + count;
-            start = own.end;
-            self.study.impossible(&model, instance, &all[own]).is_some()
-        });
-        Ok(Together {
-            possible: fit.at_bound.is_empty() && !impossible,
-            parts,
-            model,
-            theta: fit.theta,
-            cost: fit.cost,
         })
     }
 }

@@ -6,7 +6,7 @@ use super::verdict::{gain_by_chance, is_noise, is_progress};
 use crate::effects::Instance;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect,
+    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect, with_those_gone_back,
 };
 use crate::identify::{Calibration, Model, Modelled};
 use crate::{Error, Result};
@@ -73,10 +73,12 @@ impl<D: Modelled> Extension<D> {
     pub fn new<S: Study<Domain = D>>(study: &S, model: &Model<D>, instances: &[Instance<D>]) -> Result<Self> {
         let mut before = study.calibrate(model)?;
         let hints = study.hints(model, &before.theta)?;
-        let bases = [before.theta.clone(), model.nominal_theta()];
+        let mut bases = vec![vec![before.theta.clone(), model.nominal_theta()]];
+        bases.extend(with_those_gone_back(model, &before.theta).map(|back| vec![back]));
         let tried: Vec<Tried<D>> = instances
             .par_iter()
-            .filter_map(|instance| try_effect(study, model, instance, &bases, &hints, Effort::Staged))
+            .flat_map_iter(|instance| bases.iter().map(move |bases| (instance, bases)))
+            .filter_map(|(instance, bases)| try_effect(study, model, instance, bases, &hints, Effort::Staged))
             .collect();
         // A discrete choice with more parameters has to pay for them (Schwarz 1978).
         let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();

@@ -131,8 +131,8 @@ pub struct EffectSet {
     pub parameters: usize,
     /// χ² that they take away together.
     pub gain: f64,
-    /// Weighted misfit per degree of freedom that they leave together.
-    pub reduced_chi2: f64,
+    /// Half of −2 ln L, and what their parameters have to gain: sets are ranked by it.
+    pub paid: f64,
     /// What they leave.
     pub rest: Rest,
 }

@@ -10,6 +10,7 @@ use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
 use crate::effects::{Effect, Instance, Known, Registry, Size};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, scattered_starts};
+use crate::parameter::Scale;
 use crate::{Error, Result};
 
 /// How much of the data a fit uses.
@@ -532,6 +533,24 @@ pub fn fit_from<S: Study>(
     let fit = minimise(&study.problem(&model, view), start, &model.bounds(), stopping)?;
     let instance = *instance;
     Ok(Tried { instance, model, fit })
+}
+
+/// Logarithm of the factor from its nominal value beyond which a parameter may be gone for want of data.
+const GONE_LN_FACTOR: f64 = 1.0;
+
+/// Parameters of `model` at `found` (solver's scale), with those put back to their nominal values that are a multiple or a fraction of
+/// them; `None` where there are none. What is missing may have driven the resonance of a joint out of the measured band, and an effect of
+/// that joint shows only where it has come back.
+pub fn with_those_gone_back<D: Modelled>(model: &Model<D>, found: &[f64]) -> Option<Vec<f64>> {
+    let nominal = model.nominal_theta();
+    let gone = |i: &usize| {
+        let by = (found[*i] - nominal[*i]).abs();
+        model.parameters[*i].scale == Scale::Logarithmic && by > GONE_LN_FACTOR
+    };
+    let gone: Vec<usize> = (0..found.len()).filter(gone).collect();
+    let mut back = found.to_vec();
+    gone.iter().for_each(|&i| back[i] = nominal[i]);
+    (!gone.is_empty()).then_some(back)
 }
 
 /// Adds `instance` to `model` and fits it on the coarse view from the given points of the parameters in front; `None` if

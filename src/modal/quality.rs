@@ -12,6 +12,8 @@ const NOISE: [f64; 2] = [0.1, 0.5];
 const UNEXPLAINED: [f64; 2] = [0.1, 0.4];
 /// Share of what is left that is most of it.
 const MOST: f64 = 0.8;
+/// FRFs of a set from which on what one of them alone leaves is set apart.
+const MANY: usize = 4;
 /// Power-weighted coherence: good from, bad below.
 const COHERENCE: [f64; 2] = [0.9, 0.6];
 /// Difference of an FRF and its mirror over their size beyond noise: good up to, bad from.
@@ -193,11 +195,15 @@ pub(super) struct Power {
     pub coloured: f64,
     /// Lines of the first FRF, Hz, and what is left beyond the noise from each of them to the next.
     beyond_noise: Vec<(f64, f64)>,
+    /// Of each FRF its number, what was measured, and what is left beyond the noise.
+    of_frfs: Vec<(usize, [f64; 2])>,
 }
 
 impl Power {
-    /// Adds lines in ascending order: frequency, measured, left over (both any motion per force), σ of the random noise.
-    pub fn add(&mut self, lines: impl Iterator<Item = (f64, Complex64, Complex64, f64)>) {
+    /// Adds the FRF of that number: its lines in ascending order, each frequency, measured, left over (both any motion per force), σ of
+    /// the random noise.
+    pub fn add(&mut self, number: usize, lines: impl Iterator<Item = (f64, Complex64, Complex64, f64)>) {
+        let (was_measured, was_beyond) = (self.measured, self.left - self.noise);
         let mut before: Option<Complex64> = None;
         let first = self.beyond_noise.is_empty();
         for (f, measured, left, sigma) in lines {
@@ -217,10 +223,23 @@ impl Power {
             }
             before = Some(left);
         }
+        let beyond = self.left - self.noise - was_beyond;
+        self.of_frfs
+            .push((number, [self.measured - was_measured, beyond]));
     }
-}
 
-impl Power {
+    /// The number of the FRF that alone holds [`MOST`] of what is left beyond the noise, of many of them, and what the others have
+    /// unexplained, as a share of what was measured there: a spike in one FRF says nothing of the modes of all.
+    fn of_one_alone(&self) -> Option<(usize, f64)> {
+        let by_rest = |a: &&(usize, [f64; 2]), b: &&(usize, [f64; 2])| a.1[1].total_cmp(&b.1[1]);
+        let (number, [measured, beyond]) = self.of_frfs.iter().max_by(by_rest)?;
+        let all = self.left - self.noise;
+        (self.of_frfs.len() >= MANY && *beyond > MOST * all && all > 0.0).then(|| {
+            let others = ((all - beyond) / (self.measured - measured)).max(0.0);
+            (*number, if others.is_finite() { others } else { 0.0 })
+        })
+    }
+
     /// The shortest stretch of the band that holds [`MOST`] of what is left beyond the noise, Hz; `None` where that is spread over the band.
     fn most_of_the_rest(&self) -> Option<[f64; 2]> {
         let rest: Vec<f64> = self.beyond_noise.iter().map(|(_, rest)| rest.max(0.0)).collect();
@@ -296,23 +315,31 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
         quality.verdict = quality.verdict.max(verdict);
         quality.reasons.push(why);
     };
-    let rest = unexplained_share.sqrt();
-    if rest > UNEXPLAINED[0] {
-        let verdict = if rest > UNEXPLAINED[1] {
-            QualityGrade::Bad
-        } else {
-            QualityGrade::Doubtful
-        };
+    let alone = power.of_one_alone();
+    let rest = alone.map_or(unexplained_share, |(_, others)| others).sqrt();
+    let grade = match rest {
+        _ if rest > UNEXPLAINED[1] => QualityGrade::Bad,
+        _ if rest > UNEXPLAINED[0] => QualityGrade::Doubtful,
+        _ => QualityGrade::Good,
+    };
+    let one = |(number, others): (usize, f64)| {
+        format!(
+            "; nearly all of it is in FRF {number} of {} alone, the others have {:.1} %",
+            power.of_frfs.len(),
+            100.0 * others
+        )
+    };
+    if unexplained_share.sqrt() > UNEXPLAINED[0] {
+        let most = power.most_of_the_rest();
         note(
-            verdict,
+            grade.max(QualityGrade::Doubtful),
             format!(
-                "{:.1} % of what was measured is no common mode and no noise{}",
+                "{:.1} % of what was measured is no common mode and no noise{}{}",
                 100.0 * unexplained_share,
-                power
-                    .most_of_the_rest()
-                    .map_or_else(String::new, |[from, to]| format!(
-                        ", most of that at {from:.1} to {to:.1} Hz"
-                    ))
+                most.map_or_else(String::new, |[from, to]| {
+                    format!(", most of that at {from:.1} to {to:.1} Hz")
+                }),
+                alone.map_or_else(String::new, one)
             ),
         );
     }
@@ -422,13 +449,14 @@ mod tests {
     fn where_most_is_left_is_told() {
         let left_at = |bad: std::ops::Range<usize>| {
             let mut power = Power::default();
-            for _ in 0..3 {
-                power.add((0..100).map(|k| {
+            for number in 1..=3 {
+                let lines = (0..100).map(|k| {
                     let left = if bad.contains(&k) { 0.5 } else { 0.01 };
                     // As mobility every line counts the same.
                     let f = 10.0 + k as f64;
                     (f, Complex64::ONE / f, Complex64::from(left / f), 0.01 / f)
-                }));
+                });
+                power.add(number, lines);
             }
             power.most_of_the_rest()
         };
@@ -494,6 +522,46 @@ mod tests {
         assert!(quality.reasons.contains(&said), "{quality:?}");
     }
 
+    /// A spike in one FRF that is larger than all else: it is told, and the set is judged by the others.
+    #[test]
+    fn what_one_frf_alone_leaves_is_set_apart() {
+        let judged = |spike: f64, frfs: usize, of_others: f64| {
+            let mut power = Power::default();
+            for number in 1..=frfs {
+                let off = if number == 2 { spike } else { of_others };
+                power.add(
+                    number,
+                    (0..50).map(|k| {
+                        let left = if k == 30 { off } else { 0.0 };
+                        (1.0, Complex64::from(1.0 + left), Complex64::from(left), 0.0)
+                    }),
+                );
+            }
+            let found = SetFindings {
+                power,
+                frequency_scatter: None,
+                moving: false,
+                left_out_hz: Vec::new(),
+                broad_hz: Vec::new(),
+                doubts: 0,
+                elsewhere_hz: Vec::new(),
+                own_hz: Vec::new(),
+                missed_hz: Vec::new(),
+                converged: true,
+            };
+            judge_set(&found)
+        };
+        let set_apart = judged(60.0, 6, 0.1);
+        assert_eq!(set_apart.verdict, QualityGrade::Doubtful);
+        assert!(
+            set_apart.reasons[0].contains("in FRF 2 of 6 alone, the others have 0.0 %"),
+            "{set_apart:?}"
+        );
+        // Where the others are no better, and where there are too few others.
+        assert_eq!(judged(60.0, 6, 6.0).verdict, QualityGrade::Bad);
+        assert_eq!(judged(60.0, 3, 0.1).verdict, QualityGrade::Bad);
+    }
+
     #[test]
     fn powers_are_those_of_mobility() {
         let mut power = Power::default();
@@ -502,8 +570,11 @@ mod tests {
             Complex64::new(0.0, 1.0),
             Complex64::new(0.0, -2.0),
         ];
-        for _ in 0..2 {
-            power.add((0..3).map(|k| (1.0 + k as f64, Complex64::from(3.0), left[k], 0.5)));
+        for number in 1..=2 {
+            power.add(
+                number,
+                (0..3).map(|k| (1.0 + k as f64, Complex64::from(3.0), left[k], 0.5)),
+            );
         }
         // Twice: Σ f² |H|², Σ f² |left|², Σ f² σ², and 2i · (−6i)* of the second line with the third.
         let expected = [
@@ -516,6 +587,7 @@ mod tests {
         for (found, expected) in found.iter().zip(expected) {
             approx::assert_relative_eq!(*found, expected, max_relative = 1e-12);
         }
+        assert_eq!(power.of_frfs, [1, 2].map(|number| (number, [126.0, 37.5])));
         let beyond: Vec<(f64, f64)> = [(1.0, 0.75), (2.0, 3.0), (3.0, 9.0 * 3.75)]
             .map(|(f, b)| (f, 2.0 * b))
             .into();

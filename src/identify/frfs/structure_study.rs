@@ -385,7 +385,7 @@ mod tests {
     use super::*;
     use crate::identify::first_size::linear_size_of_shapes;
     use crate::identify::frfs::frf_problem::tests::{data, model};
-    use crate::identify::study::own_starts;
+    use crate::identify::study::{own_starts, with_those_gone_back};
     use approx::assert_relative_eq;
 
     /// FRFs that are a tenth larger than the model's, known to 2 %: two postures of three FRFs of five lines.
@@ -448,6 +448,19 @@ mod tests {
             "{folds:?}"
         );
         assert!(folds.iter().all(|(_, nrms)| nrms.is_finite()), "{folds:?}");
+    }
+
+    /// A joint a third as stiff as in the robot file is put back, one twice as stiff is not.
+    #[test]
+    fn parameters_far_from_the_robot_file_are_put_back() {
+        let model = model();
+        let nominal = model.nominal_theta();
+        let mut found = nominal.clone();
+        found[1] += 2f64.ln();
+        assert_eq!(with_those_gone_back(&model, &found), None);
+        let near = found.clone();
+        found[2] -= 3f64.ln();
+        assert_eq!(with_those_gone_back(&model, &found), Some(near));
     }
 
     /// A load of 0.5 kg off the flange's axis: next to nothing, its centre of mass means nothing, and one step from there gives both.

@@ -338,11 +338,12 @@ pub(crate) fn collect(
         let found = reconstruction(d, groups, m, where_modes_are);
         let from = found.frequency_hz.partition_point(|&f| f < where_modes_are[0]);
         let to = found.frequency_hz.partition_point(|&f| f <= where_modes_are[1]);
-        power.add((from..to).map(|k| {
+        let lines = (from..to).map(|k| {
             let (measured, fitted) = (found.measured_m_per_n[k], found.fitted_m_per_n[k]);
             let line = d.frequency_hz.partition_point(|&f| f < found.frequency_hz[k]);
             (found.frequency_hz[k], measured, measured - fitted, d.sigma[line])
-        }));
+        });
+        power.add(of_member[m] + 1, lines);
         for (rejected, left) in &mut unexplained {
             left.add(d, &found, rejected);
         }

@@ -221,9 +221,15 @@ impl<S: Study> Engine<'_, S> {
         let own = self.base_count + before..self.base_count + before + set.parts[place].1;
         let (front, back) = (&set.theta[..own.start], &set.theta[own.end..]);
         let new = own.start..model.parameters.len() - back.len();
+        // A parameter's name begins with the label of its effect.
+        let (was, is) = (self.label(&set.parts[place].0), self.label(other));
         let size = |p: &Parameter| {
-            let same = own.clone().find(|&i| set.model.parameters[i].name == p.name);
-            same.map_or_else(|| p.internal_within(p.nominal), |i| set.theta[i])
+            let same = |i: &usize| {
+                let name = &set.model.parameters[*i].name;
+                name.strip_prefix(&was) == p.name.strip_prefix(&is)
+            };
+            let known = own.clone().find(same);
+            known.map_or_else(|| p.internal_within(p.nominal), |i| set.theta[i])
         };
         let sizes: Vec<f64> = model.parameters[new].iter().map(size).collect();
         let start = [front, &sizes, back].concat();
@@ -242,7 +248,10 @@ impl<S: Study> Engine<'_, S> {
             let Some(simpler) = self.instances.iter().find(is_simpler) else {
                 continue;
             };
-            let (model, fit) = self.replaced(&set, place, simpler, View::FULL)?;
+            // One that cannot be set up with these sizes is no better.
+            let Ok((model, fit)) = self.replaced(&set, place, simpler, View::FULL) else {
+                continue;
+            };
             let fewer = self.exchanged(&set, place, *simpler, model, fit)?;
             if self.paid(&fewer) < self.paid(&set) {
                 set = fewer;
@@ -270,7 +279,9 @@ impl<S: Study> Engine<'_, S> {
         let Some((other, model, look)) = looks.min_by(|a, b| a.2.cost.total_cmp(&b.2.cost)) else {
             return Ok(set);
         };
-        let fit = self.minimise(&model, View::FULL, &look.theta, REFINE)?;
+        let Ok(fit) = self.minimise(&model, View::FULL, &look.theta, REFINE) else {
+            return Ok(set);
+        };
         let moved = self.exchanged(&set, place, other, model, fit)?;
         Ok(if self.paid(&moved) < self.paid(&set) {
             moved
@@ -314,8 +325,10 @@ impl<S: Study> Engine<'_, S> {
         }
         let instances: Vec<InstanceOf<S>> = parts.iter().map(|(instance, _)| *instance).collect();
         let model = self.model_of(&instances);
-        let fit = self.minimise(&model, View::FULL, &theta, REFINE)?;
-        self.together(parts, model, fit).map(Some)
+        match self.minimise(&model, View::FULL, &theta, REFINE) {
+            Ok(fit) => self.together(parts, model, fit).map(Some),
+            Err(_) => Ok(None),
+        }
     }
 
     /// Of the set that leaves least, the effect that came last, without the others: they may only have led to where it explains all.

@@ -540,17 +540,20 @@ const GONE_LN_FACTOR: f64 = 1.0;
 
 /// Parameters of `model` at `found` (solver's scale), with those put back to their nominal values that are a multiple or a fraction of
 /// them; `None` where there are none. What is missing may have driven the resonance of a joint out of the measured band, and an effect of
-/// that joint shows only where it has come back.
+/// that joint shows only where it has come back. Where most are so far off the robot file is what is wrong: `None`, too.
 pub fn with_those_gone_back<D: Modelled>(model: &Model<D>, found: &[f64]) -> Option<Vec<f64>> {
     let nominal = model.nominal_theta();
-    let gone = |i: &usize| {
-        let by = (found[*i] - nominal[*i]).abs();
-        model.parameters[*i].scale == Scale::Logarithmic && by > GONE_LN_FACTOR
-    };
-    let gone: Vec<usize> = (0..found.len()).filter(gone).collect();
+    let factors: Vec<usize> = (0..found.len())
+        .filter(|i| model.parameters[*i].scale == Scale::Logarithmic)
+        .collect();
+    let is_gone = |i: &&usize| (found[**i] - nominal[**i]).abs() > GONE_LN_FACTOR;
+    let gone: Vec<usize> = factors.iter().filter(is_gone).copied().collect();
+    if gone.is_empty() || 2 * gone.len() > factors.len() {
+        return None;
+    }
     let mut back = found.to_vec();
     gone.iter().for_each(|&i| back[i] = nominal[i]);
-    (!gone.is_empty()).then_some(back)
+    Some(back)
 }
 
 /// Adds `instance` to `model` and fits it on the coarse view from the given points of the parameters in front; `None` if

@@ -33,12 +33,18 @@ struct Named {
     lab_check: &'static str,
 }
 
+/// `local resonator on link 3`.
+fn at_its_place<D: Domain>(instance: &Instance<D>) -> String {
+    let effect = words::effect(instance.effect.id());
+    match words::place(instance.site) {
+        Some(place) => format!("{effect} {place}"),
+        None => effect,
+    }
+}
+
 fn named<D: Domain>(instance: &Instance<D>) -> Named {
     let effect = instance.effect;
-    let mut title = words::effect(effect.id());
-    if let Some(place) = words::place(instance.site) {
-        title += &format!(" {place}");
-    }
+    let mut title = at_its_place(instance);
     if let Some((key, value)) = instance.variant_label() {
         title += &format!(" ({} {value})", key.replace('_', " "));
     }
@@ -152,7 +158,12 @@ fn answer<D: Modelled>(
         ));
     }
     if !d.companions.is_empty() {
-        let others: Vec<String> = d.companions.iter().map(label_in_words).collect();
+        // What they chose alone, of candidates, they need not have chosen together.
+        let without_choice = |label: &String| {
+            let of = d.candidates.iter().find(|c| c.label() == *label);
+            of.map_or_else(|| label.clone(), |c| at_its_place(&c.instance))
+        };
+        let others: Vec<String> = d.companions.iter().map(without_choice).collect();
         let count = match others.len() {
             1 => "a second effect",
             _ => "further effects",

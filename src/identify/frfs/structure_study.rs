@@ -461,6 +461,9 @@ mod tests {
         let near = found.clone();
         found[2] -= 3f64.ln();
         assert_eq!(with_those_gone_back(&model, &found), Some(near));
+        // All joints: the file is wrong.
+        let all: Vec<f64> = nominal.iter().map(|t| t + 3f64.ln()).collect();
+        assert_eq!(with_those_gone_back(&model, &all), None);
     }
 
     /// A load of 0.5 kg off the flange's axis: next to nothing, its centre of mass means nothing, and one step from there gives both.

@@ -20,7 +20,8 @@ use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
     Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, from_possible_size,
-    held_out, own_starts, rescue, try_again, try_effect, try_effects, vanished, with_those_gone_back,
+    held_out, own_starts, paid, price_of_a_parameter, rescue, rounds_of_bases, try_again, try_effect,
+    try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -64,14 +65,6 @@ const REFIT_BRIEFLY: Stopping = Stopping {
     ..REFIT_WITHOUT_FOLD
 };
 
-/// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what
-/// a parameter that means nothing gains by chance, twice (Akaike 1974). Far from the noise so much of the misfit is correlated
-/// that hardly a value counts as independent; parameters would be rewarded there.
-fn price_of_a_parameter(independent_values: f64) -> f64 {
-    const BY_CHANCE_TWICE: f64 = 2.0;
-    independent_values.ln().max(BY_CHANCE_TWICE)
-}
-
 /// Diagnoses `model` (with the effects it already has).
 pub fn diagnose<S: Study>(study: &S, model: &ModelOf<S>) -> Result<Diagnosis<S::Domain>> {
     Engine::new(study, model)?.run()
@@ -93,7 +86,7 @@ pub fn diagnose_from<S: Study>(
 type TriedOf<S> = Tried<<S as Study>::Domain>;
 type CandidateOf<S> = EffectCandidate<<S as Study>::Domain>;
 
-/// Puts fits on all data among those that there are, the better one of each instance, best first.
+/// Puts fits to the same data among those that there are, the better one of each instance, best first.
 fn put_among<D: Modelled>(refined: &mut Vec<Tried<D>>, found: impl IntoIterator<Item = Tried<D>>) {
     for found in found {
         match refined.iter_mut().find(|t| t.instance == found.instance) {
@@ -511,26 +504,27 @@ impl<'a, S: Study> Engine<'a, S> {
         before: Option<Vec<TriedOf<S>>>,
     ) -> Result<(Vec<TriedOf<S>>, Option<Vec<f64>>)> {
         let (study, model) = (self.study, self.model);
-        let count = before.as_ref().map_or(self.instances.len(), Vec::len);
-        let progress = Progress::new("trying effects", count);
+        let rounds = rounds_of_bases(model, &base.theta);
+        let all = self.instances.len() * rounds.len();
+        let progress = Progress::new("trying effects", before.as_ref().map_or(all, Vec::len));
         let step = || progress.step();
-        let mut tried = match before {
+        let mut tried = Vec::new();
+        match before {
             None => {
-                let bases = [base.theta.clone(), model.nominal_theta()];
-                let tried = try_effects(study, model, &self.instances, &bases, &self.hints, step);
-                self.or_with_those_back(tried, base)
+                for bases in &rounds {
+                    let found = try_effects(study, model, &self.instances, bases, &self.hints, step);
+                    put_among(&mut tried, found);
+                }
             }
-            Some(before) => try_again(study, model, before, &base.theta, &self.hints, step),
-        };
+            Some(before) => tried = try_again(study, model, before, &base.theta, &self.hints, step),
+        }
         drop(progress);
         if let Some((instance, start)) = &self.beginning {
             tried.extend(fit_from(study, model, instance, start, View::COARSE, REFINE).ok());
         }
         let by_cost = |a: &TriedOf<S>, b: &TriedOf<S>| a.fit.cost.total_cmp(&b.fit.cost);
-        // One for each effect and site: its best discrete choice, of which one with more parameters has to pay for them (Schwarz
-        // 1978).
-        let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
-        let paid = |t: &TriedOf<S>| t.fit.cost + price * t.fit.theta.len() as f64;
+        // One for each effect and site: its best discrete choice, of which one with more parameters has to pay for them.
+        let paid = |t: &TriedOf<S>| paid(study, Extent::Coarse, t.fit.cost, t.fit.theta.len());
         tried.sort_by(|a, b| paid(a).total_cmp(&paid(b)));
         keep_first_of_each(&mut tried, |t| self.label(&t.instance));
         tried.sort_by(by_cost);
@@ -563,30 +557,6 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         tried.sort_by(by_cost);
         Ok((tried, base_start))
-    }
-
-    /// `tried` from where the model stands, each the better of that and of the same from where parameters that are gone are back.
-    fn or_with_those_back(&self, tried: Vec<TriedOf<S>>, base: &Fit) -> Vec<TriedOf<S>> {
-        let Some(back) = with_those_gone_back(self.model, &base.theta) else {
-            return tried;
-        };
-        let again = try_effects(
-            self.study,
-            self.model,
-            &self.instances,
-            &[back],
-            &self.hints,
-            || (),
-        );
-        let of = |instance: &InstanceOf<S>| again.iter().find(|a| a.instance == *instance);
-        let known: Vec<InstanceOf<S>> = tried.iter().map(|t| t.instance).collect();
-        let better = |t: TriedOf<S>| match of(&t.instance) {
-            Some(again) if again.fit.cost < t.fit.cost => again.clone(),
-            _ => t,
-        };
-        let mut best: Vec<TriedOf<S>> = tried.into_iter().map(better).collect();
-        best.extend(again.iter().filter(|a| !known.contains(&a.instance)).cloned());
-        best
     }
 
     /// The leaders of `tried` (best first), fitted to all data, best first.
@@ -678,8 +648,7 @@ impl<'a, S: Study> Engine<'a, S> {
                 Ok(Tried { instance, model, fit })
             })
             .collect::<Result<_>>()?;
-        let price = 0.5 * price_of_a_parameter(self.study.real_values(Extent::Full) as f64);
-        let paid = |t: &TriedOf<S>| t.fit.cost + price * t.fit.theta.len() as f64;
+        let paid = |t: &TriedOf<S>| paid(self.study, Extent::Full, t.fit.cost, t.fit.theta.len());
         if let Some(other) = others.into_iter().min_by(|a, b| paid(a).total_cmp(&paid(b)))
             && paid(&other) < paid(best)
         {

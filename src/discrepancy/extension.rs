@@ -6,7 +6,8 @@ use super::verdict::{gain_by_chance, is_noise, is_progress};
 use crate::effects::Instance;
 use crate::identify::levenberg_marquardt::{Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, rescue, try_effect, with_those_gone_back,
+    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, paid, rescue, rounds_of_bases,
+    try_effect,
 };
 use crate::identify::{Calibration, Model, Modelled};
 use crate::{Error, Result};
@@ -73,16 +74,14 @@ impl<D: Modelled> Extension<D> {
     pub fn new<S: Study<Domain = D>>(study: &S, model: &Model<D>, instances: &[Instance<D>]) -> Result<Self> {
         let mut before = study.calibrate(model)?;
         let hints = study.hints(model, &before.theta)?;
-        let mut bases = vec![vec![before.theta.clone(), model.nominal_theta()]];
-        bases.extend(with_those_gone_back(model, &before.theta).map(|back| vec![back]));
+        let rounds = rounds_of_bases(model, &before.theta);
         let tried: Vec<Tried<D>> = instances
             .par_iter()
-            .flat_map_iter(|instance| bases.iter().map(move |bases| (instance, bases)))
+            .flat_map_iter(|instance| rounds.iter().map(move |bases| (instance, bases)))
             .filter_map(|(instance, bases)| try_effect(study, model, instance, bases, &hints, Effort::Staged))
             .collect();
-        // A discrete choice with more parameters has to pay for them (Schwarz 1978).
-        let price = 0.5 * (study.real_values(Extent::Coarse) as f64).ln();
-        let paid = |t: &Tried<D>| t.fit.cost + price * t.fit.theta.len() as f64;
+        // A discrete choice with more parameters has to pay for them.
+        let paid = |t: &Tried<D>| paid(study, Extent::Coarse, t.fit.cost, t.fit.theta.len());
         let mut best = tried
             .into_iter()
             .min_by(|a, b| paid(a).total_cmp(&paid(b)))

@@ -535,25 +535,40 @@ pub fn fit_from<S: Study>(
     Ok(Tried { instance, model, fit })
 }
 
+/// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what
+/// a parameter that means nothing gains by chance, twice (Akaike 1974). Far from the noise so much of the misfit is correlated
+/// that hardly a value counts as independent; parameters would be rewarded there.
+pub fn price_of_a_parameter(independent_values: f64) -> f64 {
+    const BY_CHANCE_TWICE: f64 = 2.0;
+    independent_values.ln().max(BY_CHANCE_TWICE)
+}
+
+/// Half of −2 ln L on a view, `cost`, and what so many parameters have to gain of it: models with other numbers of them are ranked by that.
+pub fn paid<S: Study>(study: &S, extent: Extent, cost: f64, parameters: usize) -> f64 {
+    cost + 0.5 * price_of_a_parameter(study.real_values(extent) as f64) * parameters as f64
+}
+
 /// Logarithm of the factor from its nominal value beyond which a parameter may be gone for want of data.
 const GONE_LN_FACTOR: f64 = 1.0;
 
-/// Parameters of `model` at `found` (solver's scale), with those put back to their nominal values that are a multiple or a fraction of
-/// them; `None` where there are none. What is missing may have driven the resonance of a joint out of the measured band, and an effect of
-/// that joint shows only where it has come back. Where most are so far off the robot file is what is wrong: `None`, too.
-pub fn with_those_gone_back<D: Modelled>(model: &Model<D>, found: &[f64]) -> Option<Vec<f64>> {
+/// From where effects are tried besides `model`, which stands at `found` (solver's scale): points of its parameters, in rounds. First there
+/// and at the nominal values; then with those parameters put back to these that are a multiple or a fraction of them. What is missing may
+/// have driven the resonance of a joint out of the measured band, and an effect of that joint shows only where it has come back. Where most
+/// are so far off the robot file is what is wrong, and there is one round.
+pub fn rounds_of_bases<D: Modelled>(model: &Model<D>, found: &[f64]) -> Vec<Vec<Vec<f64>>> {
     let nominal = model.nominal_theta();
     let factors: Vec<usize> = (0..found.len())
         .filter(|i| model.parameters[*i].scale == Scale::Logarithmic)
         .collect();
     let is_gone = |i: &&usize| (found[**i] - nominal[**i]).abs() > GONE_LN_FACTOR;
     let gone: Vec<usize> = factors.iter().filter(is_gone).copied().collect();
-    if gone.is_empty() || 2 * gone.len() > factors.len() {
-        return None;
-    }
     let mut back = found.to_vec();
     gone.iter().for_each(|&i| back[i] = nominal[i]);
-    Some(back)
+    let mut rounds = vec![vec![found.to_vec(), nominal]];
+    if !gone.is_empty() && 2 * gone.len() <= factors.len() {
+        rounds.push(vec![back]);
+    }
+    rounds
 }
 
 /// Adds `instance` to `model` and fits it on the coarse view from the given points of the parameters in front; `None` if

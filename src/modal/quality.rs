@@ -31,6 +31,18 @@ pub enum QualityGrade {
     Bad,
 }
 
+impl QualityGrade {
+    /// Of a value that is good up to the first of two limits and bad from the second; from the first and below the second, where they fall.
+    fn of(value: f64, limits: [f64; 2]) -> Self {
+        let sign = if limits[0] <= limits[1] { 1.0 } else { -1.0 };
+        match sign * value {
+            v if v <= sign * limits[0] => QualityGrade::Good,
+            v if v > sign * limits[1] => QualityGrade::Bad,
+            _ => QualityGrade::Doubtful,
+        }
+    }
+}
+
 impl std::fmt::Display for QualityGrade {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
@@ -111,18 +123,9 @@ pub fn judge(
         reasons: Vec::new(),
     };
     let mut note = |value: f64, limits: [f64; 2], what: String| {
-        // Limits that fall are those of something that should be large.
-        let (good, bad) = if limits[0] <= limits[1] {
-            (value <= limits[0], value > limits[1])
-        } else {
-            (value >= limits[0], value < limits[1])
-        };
-        if !good {
-            quality.verdict = quality.verdict.max(if bad {
-                QualityGrade::Bad
-            } else {
-                QualityGrade::Doubtful
-            });
+        let grade = QualityGrade::of(value, limits);
+        if grade != QualityGrade::Good {
+            quality.verdict = quality.verdict.max(grade);
             quality.reasons.push(what);
         }
     };
@@ -317,11 +320,7 @@ pub(super) fn judge_set(found: &SetFindings) -> SetQuality {
     };
     let alone = power.of_one_alone();
     let rest = alone.map_or(unexplained_share, |(_, others)| others).sqrt();
-    let grade = match rest {
-        _ if rest > UNEXPLAINED[1] => QualityGrade::Bad,
-        _ if rest > UNEXPLAINED[0] => QualityGrade::Doubtful,
-        _ => QualityGrade::Good,
-    };
+    let grade = QualityGrade::of(rest, UNEXPLAINED);
     let one = |(number, others): (usize, f64)| {
         format!(
             "; nearly all of it is in FRF {number} of {} alone, the others have {:.1} %",

@@ -96,10 +96,9 @@ fn answer<D: Modelled>(
     lead: Option<&StructureLead>,
 ) -> VerdictCard {
     let mut card = VerdictCard::default();
-    let label_in_words = |label: &String| {
-        let of = d.candidates.iter().find(|c| c.label() == *label);
-        of.map_or_else(|| label.clone(), |c| named(&c.instance).title)
-    };
+    let candidate = |label: &String| d.candidates.iter().find(|c| c.label() == *label);
+    let label_in_words =
+        |label: &String| candidate(label).map_or_else(|| label.clone(), |c| named(&c.instance).title);
     match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
             let of = named(&winner.instance);
@@ -159,10 +158,8 @@ fn answer<D: Modelled>(
     }
     if !d.companions.is_empty() {
         // What they chose alone, of candidates, they need not have chosen together.
-        let without_choice = |label: &String| {
-            let of = d.candidates.iter().find(|c| c.label() == *label);
-            of.map_or_else(|| label.clone(), |c| at_its_place(&c.instance))
-        };
+        let without_choice =
+            |label: &String| candidate(label).map_or_else(|| label.clone(), |c| at_its_place(&c.instance));
         let others: Vec<String> = d.companions.iter().map(without_choice).collect();
         let count = match others.len() {
             1 => "a second effect",

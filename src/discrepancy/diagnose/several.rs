@@ -1,8 +1,10 @@
 //! Several effects that explain together what none does alone.
 
+use std::collections::VecDeque;
+
 use rayon::prelude::*;
 
-use super::{CandidateOf, Engine, Evidence, REFINE, REFIT_BRIEFLY, TriedOf, price_of_a_parameter};
+use super::{CandidateOf, Engine, Evidence, REFINE, REFIT_BRIEFLY, TriedOf};
 use crate::Result;
 use crate::discrepancy::candidate::EffectCandidate;
 use crate::discrepancy::faint::Linear;
@@ -12,7 +14,7 @@ use crate::identify::first_size::linear_size;
 use crate::identify::frfs::calibrate::estimates;
 use crate::identify::levenberg_marquardt::{Fit, LeastSquares};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, try_effect,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, paid, try_effect,
 };
 use crate::parameter::Parameter;
 use crate::progress::Progress;
@@ -128,18 +130,13 @@ impl<S: Study> Engine<'_, S> {
         });
         let above = evidence.base_chi2 - self.freedom(self.model, Extent::Full);
         let nearly_all = |set: &Together<S>| evidence.base_chi2 - 2.0 * set.cost > NEARLY_ALL * above;
-        let mut begun: Vec<Begun<S>> = Vec::new();
-        let mut led_to: Vec<Begun<S>> = Vec::new();
         let mut threes: Vec<Together<S>> = Vec::new();
         let is_plain = |(pair, _): &Begun<S>| self.leaves_plain(pair, nearly_all(pair));
-        if pairs.first().map_or(Ok(false), is_plain)? {
-            pairs.truncate(THREE_LEADERS);
-        } else {
-            begun.append(&mut pairs);
-        }
-        // What the search was led to comes first.
-        pairs.reverse();
-        while let Some((pair, promising)) = led_to.pop().or_else(|| pairs.pop()) {
+        let (mut begun, mut queue) = match pairs.first().map_or(Ok(false), is_plain)? {
+            true => (Vec::new(), pairs.into_iter().take(THREE_LEADERS).collect()),
+            false => (pairs, VecDeque::new()),
+        };
+        while let Some((pair, promising)) = queue.pop_front() {
             let linear = self.by_linear_gain(&pair);
             let order = self.by_turns(&linear, &promising);
             let (found, _) = self.with_another(&pair, &order, linear, THREES, &mut [0, 0])?;
@@ -154,7 +151,8 @@ impl<S: Study> Engine<'_, S> {
                     && let Some(two) = self.without_needless(&three)?
                 {
                     self.keep_better(&mut best, &two, (candidates, leading), evidence)?;
-                    led_to.push((two, promising.clone()));
+                    // What the search was led to comes first.
+                    queue.push_front((two, promising.clone()));
                 }
                 threes.push(three);
             }
@@ -163,8 +161,7 @@ impl<S: Study> Engine<'_, S> {
                 break;
             }
         }
-        let pairs = begun;
-        let last = self.last_alone(pairs.iter().map(|(pair, _)| pair).chain(&threes))?;
+        let last = self.last_alone(begun.iter().map(|(pair, _)| pair).chain(&threes))?;
         if answers(&best) {
             return Ok((best, counts, last));
         }
@@ -185,8 +182,7 @@ impl<S: Study> Engine<'_, S> {
 
     /// Half of −2 ln L of a set, and what its parameters have to gain.
     fn paid(&self, set: &Together<S>) -> f64 {
-        let price = 0.5 * price_of_a_parameter(self.study.real_values(Extent::Full) as f64);
-        set.cost + price * set.theta.len() as f64
+        paid(self.study, Extent::Full, set.cost, set.theta.len())
     }
 
     /// Whether a pair of effects leaves more than noise of what is plain. Of many data what is small beside the scatter of χ² may be plain,

@@ -31,7 +31,7 @@ TEXT, NUMBER = {"type": ["null", "string"]}, {"type": ["null", "number"]}
 UNSEEN = {
     **dict.fromkeys(
         ["warnings", "effects", "stands_out", "reasons", "indistinguishable", "images", "missing", "sites", "unreadable", "not_used",
-         "out_of_reach", "inseparable", "joints", "companions"],
+         "out_of_reach", "inseparable", "joints", "companions", "chosen_anew"],
         {"type": "array", "items": {"type": "string"}},
     ),
     **dict.fromkeys(["not_converged_because", "best_guess", "companion", "looks_like", "too_little_data", "site", "cut_list", "next_step",

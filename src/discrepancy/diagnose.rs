@@ -225,22 +225,24 @@ impl<'a, S: Study> Engine<'a, S> {
             self.begin_at_possible_sizes(&tried, &coarse_base, &mut refined)?;
         }
 
+        let base_rest = self.study.rest(model, &base.theta)?;
         if base_reduced < FAINT {
-            self.begin_at_linear_sizes(&base, &mut refined)?;
+            self.begin_at_linear_sizes(&base, &base_rest, &mut refined)?;
         }
-        let (diagnosis, alone) = self.conclude((&coarse_base, &base), &tried, &refined)?;
+        let bases = (&coarse_base, &base, &base_rest);
+        let (diagnosis, alone) = self.conclude(bases, &tried, &refined)?;
         let Some(alone) = alone else { return Ok(diagnosis) };
         self.put_choices_among(&mut refined, vec![alone]);
-        Ok(self.conclude((&coarse_base, &base), &tried, &refined)?.0)
+        Ok(self.conclude(bases, &tried, &refined)?.0)
     }
 
-    /// The verdict, from the fits of the model as it stands on the coarse view and on all data, those of every effect on the coarse
-    /// view and those of the leaders on all data. Besides, where several effects were tried together: one of them that alone explains
+    /// The verdict, from the fits of the model as it stands on the coarse view and on all data, and what this leaves, those of every effect
+    /// on the coarse view and those of the leaders on all data. Besides, where several effects were tried together: one of them that alone explains
     /// more than any of the leaders does, which began elsewhere.
     #[allow(clippy::type_complexity)]
     fn conclude(
         &self,
-        (coarse_base, base): (&Fit, &Fit),
+        (coarse_base, base, base_rest): (&Fit, &Fit, &Rest),
         tried: &[TriedOf<S>],
         refined: &[TriedOf<S>],
     ) -> Result<(Diagnosis<S::Domain>, Option<TriedOf<S>>)> {
@@ -258,7 +260,6 @@ impl<'a, S: Study> Engine<'a, S> {
             None => (base_reduced, base_residual),
         };
         let share = best_residual.independent_share.min(1.0);
-        let base_rest = study.rest(model, &base.theta)?;
         // What a model leaves that is far off has structure from line to line, too, which is no noise.
         let noise_factor = match best {
             Some(best) if base_rest.noise_factor() > 1.0 => {
@@ -305,7 +306,7 @@ impl<'a, S: Study> Engine<'a, S> {
             held_out: held_out(study, model, &base.theta, Extent::Coarse, REFIT_WITHOUT_FOLD)?,
             residual: base_residual,
             reduced_chi2: base_reduced,
-            rest: base_rest,
+            rest: base_rest.clone(),
             theta: base.theta.clone(),
             calibration: self.calibration.clone(),
         };
@@ -709,13 +710,14 @@ impl<'a, S: Study> Engine<'a, S> {
 
     /// Where little is missing: a look at few data may show too little of an effect to lead its fit away from where it vanishes, or to
     /// promise anything, and all data show it. Those that gain more by the size that all data give than they did are fitted from there.
-    fn begin_at_linear_sizes(&self, base: &Fit, refined: &mut Vec<TriedOf<S>>) -> Result<()> {
+    fn begin_at_linear_sizes(&self, base: &Fit, rest: &Rest, refined: &mut Vec<TriedOf<S>>) -> Result<()> {
         let effects = (self.instances.as_slice(), self.hints.as_slice());
+        let of_all: Vec<f64> = rest.tests.iter().filter_map(|t| t.frequency_hz).collect();
         let gained = |label: &str| {
             let known = refined.iter().filter(|r| self.label(&r.instance) == label);
             known.map(|r| 2.0 * (base.cost - r.fit.cost)).fold(0.0, f64::max)
         };
-        let sizes = faint::sizes(self.study, self.model, base, effects, gained)?;
+        let sizes = faint::sizes(self.study, self.model, base, effects, &of_all, gained)?;
         // A size that no robot stands with is no start.
         let found: Vec<TriedOf<S>> = sizes
             .into_par_iter()

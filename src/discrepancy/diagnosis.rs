@@ -92,6 +92,16 @@ impl<D: Modelled> Diagnosis<D> {
         }
     }
 
+    /// `What stands above the noise looks like a resonance at one place …`, where the verdict is unknown and the library makes nothing of it.
+    pub fn unexplained_in_words(&self) -> Option<String> {
+        let guess = self.candidates.get(self.best_guess?)?;
+        let all = self.baseline.rest.largest().filter(|_| guess.rest.is_none())?;
+        Some(format!(
+            "What stands above the noise looks like {}.",
+            all.in_words()
+        ))
+    }
+
     /// What the best of the library makes of the data where the verdict is unknown.
     pub fn best_guess_in_words(&self) -> Option<String> {
         let guess = self.candidates.get(self.best_guess?)?;
@@ -102,7 +112,7 @@ impl<D: Modelled> Diagnosis<D> {
             guess.label(),
             100.0 * share,
             100.0 * std,
-            left.looks_like
+            left.in_words()
         ))
     }
 }

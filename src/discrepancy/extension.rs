@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::verdict::{gain_by_chance, is_noise, is_progress};
 use crate::effects::Instance;
-use crate::identify::levenberg_marquardt::{Stopping, minimise};
+use crate::identify::levenberg_marquardt::{Fit, LeastSquares, Stopping, minimise};
 use crate::identify::study::{
-    Effort, Extent, HeldOut, Residual, Study, Tried, View, held_out, paid, rescue, rounds_of_bases,
-    try_effect,
+    Effort, Extent, HeldOut, InstanceOf, ModelOf, Residual, Study, Tried, View, exchanged, held_out, paid,
+    rescue, rounds_of_bases, try_effect,
 };
 use crate::identify::{Calibration, Model, Modelled};
 use crate::{Error, Result};
@@ -34,6 +34,8 @@ pub struct Extension<D: Modelled> {
     pub before: Fitted<D>,
     /// The model with it.
     pub after: Fitted<D>,
+    /// Effects that were in the model already and choose otherwise beside it.
+    pub chosen_anew: Vec<Instance<D>>,
     /// The effect vanishes in these data: the fit with it is the fit without it.
     pub vanished: bool,
     /// Whether the held-out error fell by more than chance would let it; `None` with one fold.
@@ -126,6 +128,10 @@ impl<D: Modelled> Extension<D> {
             extended = extended.with_start(after.theta.clone());
             vanished = true;
         }
+        let mut chosen_anew = Vec::new();
+        if !vanished {
+            chosen_anew = choose_anew(study, &mut extended, &mut after)?;
+        }
         let before = Fitted::new(study, model.clone(), before)?;
         let after = if vanished {
             Fitted {
@@ -140,11 +146,63 @@ impl<D: Modelled> Extension<D> {
         Ok(Extension {
             progress: progress(&before, &after),
             instance: best.instance,
+            chosen_anew,
             vanished,
             before,
             after,
         })
     }
+}
+
+/// Lets the effects that stood in `model` before the last one choose anew (a direction, a form): a choice made while that was missing may
+/// have stood in for it. Those that fit better by more than what their parameters cost stay, with their fit; they are told.
+fn choose_anew<S: Study>(
+    study: &S,
+    model: &mut ModelOf<S>,
+    calibration: &mut Calibration,
+) -> Result<Vec<InstanceOf<S>>> {
+    let mut chosen = Vec::new();
+    let mut theta = calibration.theta.clone();
+    let mut cost = study.problem(model, View::FULL).cost(&theta)?;
+    for place in 0..model.effects().len().saturating_sub(1) {
+        let known = model.effects()[place].instance;
+        let variants = known.effect.variants(known.site).into_iter();
+        let others: Vec<InstanceOf<S>> = variants
+            .filter(|variant| *variant != known.variant)
+            .map(|variant| Instance { variant, ..known })
+            .collect();
+        let looks = others.into_par_iter().filter_map(|other| {
+            let (model, start) = exchanged(study, model, &theta, place, &other);
+            let fit = minimise(
+                &study.problem(&model, View::COARSE),
+                &start,
+                &model.bounds(),
+                REFINE,
+            )
+            .ok()?;
+            Some((other, model, fit))
+        });
+        let paid_on = |extent, fit: &Fit| paid(study, extent, fit.cost, fit.theta.len());
+        let Some((other, anew, look)) =
+            looks.min_by(|a, b| paid_on(Extent::Coarse, &a.2).total_cmp(&paid_on(Extent::Coarse, &b.2)))
+        else {
+            continue;
+        };
+        let fit = minimise(
+            &study.problem(&anew, View::FULL),
+            &look.theta,
+            &anew.bounds(),
+            REFINE,
+        )?;
+        if paid_on(Extent::Full, &fit) < paid(study, Extent::Full, cost, theta.len()) {
+            (*model, theta, cost) = (anew, fit.theta, fit.cost);
+            chosen.push(other);
+        }
+    }
+    if !chosen.is_empty() {
+        *calibration = study.calibrate(&model.with_start(theta))?;
+    }
+    Ok(chosen)
 }
 
 /// Whether the error on folds left out of the fit fell by more than chance.

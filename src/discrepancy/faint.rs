@@ -42,13 +42,15 @@ impl<S: Study> Linear<S> {
 }
 
 /// Where to begin the fits of those effects that would take more χ² away than chance and than they do already. `base`: the fit of
-/// `model` to all data; `instances`: all effects, each with all its discrete choices, and frequencies at which much is left; `gained`: by
-/// how much the effect of a label has made χ² fall so far.
+/// `model` to all data; `instances`: all effects, each with all its discrete choices, and frequencies at which much is left; `of_all`:
+/// frequencies that only all data together show, at which they are asked without a share of them; `gained`: by how much the effect of a
+/// label has made χ² fall so far.
 pub(super) fn sizes<S: Study>(
     study: &S,
     model: &ModelOf<S>,
     base: &Fit,
     (instances, hints): (&[InstanceOf<S>], &[f64]),
+    of_all: &[f64],
     gained: impl Fn(&str) -> f64 + Sync,
 ) -> Result<Vec<Linear<S>>> {
     let count = model.parameters.len();
@@ -77,11 +79,25 @@ pub(super) fn sizes<S: Study>(
         .collect();
     best_of_each(&mut hinted);
     hinted.truncate(ASKED);
-    let mut sure: Vec<Linear<S>> = hinted
+    let mut asked: Vec<(InstanceOf<S>, Vec<Vec<f64>>)> = hinted
+        .into_iter()
+        .map(|Linear { instance, size }| (instance, vec![size.shape, size.theta[count..].to_vec()]))
+        .collect();
+    for instance in instances.iter().filter(|_| !of_all.is_empty()) {
+        let extended = study.extend(model, instance);
+        let own = |hints| own_starts(study, &extended, count, instance, hints);
+        let without = own(&[]);
+        let shapes: Vec<Vec<f64>> = own(of_all).into_iter().filter(|s| !without.contains(s)).collect();
+        match asked.iter_mut().find(|(known, _)| known == instance) {
+            Some((_, known)) => known.extend(shapes),
+            None if shapes.is_empty() => {}
+            None => asked.push((*instance, shapes)),
+        }
+    }
+    let mut sure: Vec<Linear<S>> = asked
         .into_par_iter()
-        .filter_map(|Linear { instance, size }| {
+        .filter_map(|(instance, shapes)| {
             let extended = study.extend(model, &instance);
-            let shapes = [size.shape, size.theta[count..].to_vec()];
             let problem = study.problem(&extended, View::FULL);
             let size = linear_size_of_shapes(&problem, &extended, &base.theta, &shapes)?;
             let sure = Linear::new(instance, size, base.cost)?;

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 use super::setup::CARE;
 use crate::identify::own_errors::OwnErrors;
-use crate::identify::rest::{LIKE_A_PLACE, Rest, RestTest};
+use crate::identify::rest::{Rest, RestTest};
 use crate::statistics::ln_normal;
 
 /// Probability that the errors of the setup are large enough to be seen.
@@ -177,7 +177,7 @@ fn of_test(gain: f64, test: &RestTest, small_errors: f64, stand_in: fn(f64) -> f
         VISIBLE_ERRORS.ln() + log_density(excess, test.std, small_errors, |u| (-u).exp()),
         of_nearly_right(gain, test),
     ];
-    let blind = match test.looks_like == LIKE_A_PLACE {
+    let blind = match test.is_of_a_place() {
         true => BESIDES_PLACES,
         false => 0.0,
     };
@@ -246,7 +246,7 @@ pub fn share_explained(gain: f64, rest: &Rest) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::rest::BeyondSlips;
+    use crate::identify::rest::{BeyondSlips, LIKE_A_PLACE};
 
     fn rest(excess: f64, std: f64) -> Rest {
         Rest {

@@ -429,6 +429,7 @@ mod tests {
             std: 10.0,
             p_value: 0.5,
             noise_factor,
+            frequency_hz: None,
         }];
         Rest {
             tests: tests.clone(),
@@ -477,6 +478,7 @@ mod tests {
                 std: 10.0,
                 p_value,
                 noise_factor: 1.0,
+                frequency_hz: None,
             };
             let mut rest = after_slips(0.5 * (excess - left), 1.0);
             rest.tests = vec![test(excess, 1e-20)];

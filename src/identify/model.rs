@@ -80,6 +80,13 @@ impl<D: Modelled> Model<D> {
         model
     }
 
+    /// The baseline: the same model without the effects added to it.
+    pub fn without_effects(&self) -> Self {
+        let mut parameters = self.parameters.clone();
+        parameters.truncate(self.baseline_parameter_count());
+        Model::of(self.fixed.clone(), parameters)
+    }
+
     /// The same model with a solution found earlier (solver's scale) to start from.
     pub fn with_start(&self, theta: Vec<f64>) -> Self {
         let mut model = self.without_start();

@@ -89,6 +89,8 @@ const SMALL_ERRORS: &str =
     "angles of joints, sensors and hits, gain of the hammer, stiffness from posture to posture, warming up";
 /// What the patterns of one place look like.
 pub const LIKE_A_PLACE: &str = "one law at one place of the structure, the same at all postures";
+/// What the patterns of a resonance of one place look like.
+pub const LIKE_A_RESONANCE: &str = "a resonance at one place, the same at all postures";
 /// What the patterns of folds with parameters of their own look like.
 pub(crate) const LIKE_FOLDS: &str = "parameters that differ from posture to posture";
 
@@ -197,6 +199,9 @@ pub struct RestTest {
     pub p_value: f64,
     /// Energy expected of the noise over that of white noise of the known level.
     pub noise_factor: f64,
+    /// Where the patterns that find it have a resonance, Hz; `None` for patterns that have none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequency_hz: Option<f64>,
 }
 
 impl RestTest {
@@ -224,6 +229,7 @@ impl RestTest {
             std,
             p_value,
             noise_factor: expected / values,
+            frequency_hz: None,
         })
     }
 
@@ -237,6 +243,19 @@ impl RestTest {
     ) -> Option<Self> {
         let std = (2.0 * freedom).sqrt().hypot(noise_known_to * freedom);
         (freedom > 0.0).then(|| Self::new(looks_like, found, freedom, std, freedom))?
+    }
+
+    /// Whether the patterns are of one place: few unknowns for all FRFs together.
+    pub fn is_of_a_place(&self) -> bool {
+        [LIKE_A_PLACE, LIKE_A_RESONANCE].contains(&self.looks_like)
+    }
+
+    /// What the patterns are, and where they have a resonance.
+    pub fn in_words(&self) -> String {
+        match self.frequency_hz {
+            Some(hz) => format!("{} ({hz:.1} Hz)", self.looks_like),
+            None => self.looks_like.into(),
+        }
     }
 
     /// Excess in standard deviations of what noise leaves.

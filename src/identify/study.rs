@@ -10,7 +10,7 @@ use super::model::{Model, Modelled};
 use super::rest::{BeyondSlips, Rest};
 use crate::effects::{Effect, Instance, Known, Registry, Size};
 use crate::identify::frfs::calibrate::{Calibration, Estimate, scattered_starts};
-use crate::parameter::Scale;
+use crate::parameter::{Parameter, Scale};
 use crate::{Error, Result};
 
 /// How much of the data a fit uses.
@@ -533,6 +533,32 @@ pub fn fit_from<S: Study>(
     let fit = minimise(&study.problem(&model, view), start, &model.bounds(), stopping)?;
     let instance = *instance;
     Ok(Tried { instance, model, fit })
+}
+
+/// `model` with the effect at `place` of those added to it exchanged for `other`, and the point of that at `theta` (solver's scale): sizes
+/// that both have stay, others are nominal.
+pub fn exchanged<S: Study>(
+    study: &S,
+    model: &ModelOf<S>,
+    theta: &[f64],
+    place: usize,
+    other: &InstanceOf<S>,
+) -> (ModelOf<S>, Vec<f64>) {
+    let mut new = model.without_effects();
+    for (i, added) in model.effects().iter().enumerate() {
+        new = study.extend(&new, if i == place { other } else { &added.instance });
+    }
+    // A parameter's name begins with the label of its effect.
+    let (was, is) = (model.effects()[place].instance.label(), other.label());
+    let own = new.effects()[place].parameters.clone();
+    let known = |(i, p): (usize, &Parameter)| {
+        let shared = p.name.strip_prefix(&is).filter(|_| own.contains(&i));
+        let name = shared.map_or_else(|| p.name.clone(), |rest| format!("{was}{rest}"));
+        let before = model.parameters.iter().position(|known| known.name == name);
+        before.map_or_else(|| p.internal_within(p.nominal), |before| theta[before])
+    };
+    let theta = new.parameters.iter().enumerate().map(known).collect();
+    (new, theta)
 }
 
 /// What each parameter must gain in χ², for so many independent values: their logarithm (Schwarz 1978), and in any case what

@@ -261,6 +261,8 @@ fn unknown<D: Modelled>(
             .push(("Best guess", words.replacen(&guess.label(), &of.title, 1)));
         card.check = Some(format!("Of the best guess ({}): {}", of.title, of.lab_check));
     }
+    card.facts
+        .extend(d.unexplained_in_words().map(|words| ("A lead", words)));
 }
 
 /// Numbers of the robot file that explain what no effect does stand before what the data draw.

@@ -199,3 +199,36 @@ fn a_third_effect_is_sought_where_two_leave_structure() {
         .collect();
     assert_eq!(besides, ["base-compliance", "local-resonator@link-3"]);
 }
+
+/// A direction that was chosen while something else was missing is chosen anew once that is there.
+#[test]
+fn a_choice_made_too_early_is_made_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("cell");
+    let path = dir.to_str().unwrap();
+    document(&[
+        "simulate",
+        "--out",
+        path,
+        "--seed",
+        "31",
+        "--postures",
+        "4",
+        "--lines-hz",
+        "0.5",
+        "--effect",
+        "local-resonator@link-3:direction=z,mass_kg=6,frequency_hz=14,damping_ratio=0.05",
+        "--effect",
+        "load-dependent-stiffness:beta=0.1",
+    ]);
+    let first = document(&["add", path, "local-resonator@link-3:direction=x"]);
+    assert_eq!(first["chosen_anew"].as_array().unwrap().len(), 0);
+    let second = document(&["add", path, "load-dependent-stiffness"]);
+    assert_eq!(second["chosen_anew"][0], "local-resonator@link-3 (direction z)");
+    let after = second["after"]["reduced_chi2"].as_f64().unwrap();
+    assert!((0.9..1.1).contains(&after), "{after}");
+    // The revision has it, too.
+    let model = document(&["calibrate", path]);
+    assert!(model["reduced_chi2"].as_f64().unwrap() < 1.1);
+    assert_eq!(document(&["diagnose", path])["verdict"], "none");
+}

@@ -576,6 +576,7 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
             let guess = d
                 .best_guess_in_words()
                 .into_iter()
+                .chain(d.unexplained_in_words())
                 .chain(d.slips_in_words())
                 .map(|words| wrapped(&words, "  "))
                 .collect::<String>();

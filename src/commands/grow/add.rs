@@ -11,7 +11,7 @@ use crate::commands::next_step::Guide;
 use crate::commands::text::{Emphasis, files_first, percent, table, warnings, wrapped};
 use crate::commands::{CampaignArg, Outcome};
 use crate::discrepancy::extension::{Extension, Fitted};
-use crate::effects::{Cutting, Registry, Structure};
+use crate::effects::{Cutting, Instance, Registry, Structure};
 use crate::identify::Modelled;
 use crate::identify::{Calibration, Options};
 use crate::report::number::plus_minus;
@@ -71,6 +71,8 @@ struct Document<'a> {
     fit: FitFound<'a>,
     error: ErrorHeldOut,
     vanished: bool,
+    /// Effects in the model already that choose otherwise now.
+    chosen_anew: Vec<String>,
     before: FitInShort,
     after: FitInShort,
     progress: Option<bool>,
@@ -85,6 +87,7 @@ impl<'a> Document<'a> {
             after,
             vanished,
             progress,
+            chosen_anew,
         } = &addition.extension;
         Document {
             domain: D::SIDE,
@@ -99,6 +102,7 @@ impl<'a> Document<'a> {
                 held_out_nrms: after.held_out_nrms(),
             },
             vanished: *vanished,
+            chosen_anew: chosen_anew.iter().map(Instance::title).collect(),
             before: FitInShort::of(before),
             after: FitInShort::of(after),
             progress: *progress,
@@ -153,6 +157,7 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
         after,
         progress,
         vanished,
+        chosen_anew,
     } = extension;
     let mut text = files_first(&[], noticed);
     text += &format!(
@@ -160,6 +165,12 @@ fn describe<D: CampaignSide>(addition: &Addition<D>, parameters: &str) -> String
         Emphasis::Strong.on(instance.title()),
         wrapped(instance.effect.explanation(), "  ")
     );
+    for anew in chosen_anew {
+        text += &wrapped(
+            &format!("Beside it {} fits better than as it was; changed.", anew.title()),
+            "  ",
+        );
+    }
     text += parameters;
     text += &format!(
         "\nerror (nrms)    {} -> {}, noise floor {}\n",

@@ -14,9 +14,9 @@ use crate::identify::first_size::linear_size;
 use crate::identify::frfs::calibrate::estimates;
 use crate::identify::levenberg_marquardt::{Fit, LeastSquares};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, paid, try_effect,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, exchanged, fit_as_a_model, fit_from, paid,
+    try_effect,
 };
-use crate::parameter::Parameter;
 use crate::progress::Progress;
 
 /// Candidates whose combination with every other one is tried where none explains the data alone.
@@ -210,25 +210,8 @@ impl<S: Study> Engine<'_, S> {
         other: &InstanceOf<S>,
         view: View,
     ) -> Result<(ModelOf<S>, Fit)> {
-        let mut instances: Vec<InstanceOf<S>> = set.parts.iter().map(|(instance, _)| *instance).collect();
-        instances[place] = *other;
-        let model = self.model_of(&instances);
-        let before = set.parts[..place].iter().map(|(_, count)| count).sum::<usize>();
-        let own = self.base_count + before..self.base_count + before + set.parts[place].1;
-        let (front, back) = (&set.theta[..own.start], &set.theta[own.end..]);
-        let new = own.start..model.parameters.len() - back.len();
-        // A parameter's name begins with the label of its effect.
-        let (was, is) = (self.label(&set.parts[place].0), self.label(other));
-        let size = |p: &Parameter| {
-            let same = |i: &usize| {
-                let name = &set.model.parameters[*i].name;
-                name.strip_prefix(&was) == p.name.strip_prefix(&is)
-            };
-            let known = own.clone().find(same);
-            known.map_or_else(|| p.internal_within(p.nominal), |i| set.theta[i])
-        };
-        let sizes: Vec<f64> = model.parameters[new].iter().map(size).collect();
-        let start = [front, &sizes, back].concat();
+        let before = set.model.effects().len() - set.parts.len();
+        let (model, start) = exchanged(self.study, &set.model, &set.theta, before + place, other);
         let fit = self.minimise(&model, view, &start, REFINE)?;
         Ok((model, fit))
     }

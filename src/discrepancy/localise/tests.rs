@@ -6,8 +6,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::data::{AxesRef, Axis, BodyRef, MeasuredDof, Point, RobotSection};
+use crate::effects::Registry;
 use crate::identify::frfs::frf_data::{FrfBlock, FrfDatum};
-use crate::identify::rest::{LIKE_A_PLACE, RestTest};
+use crate::identify::rest::{LIKE_A_PLACE, LIKE_A_RESONANCE, RestTest};
 use crate::identify::{FrfData, Options};
 use crate::robot::RobotModel;
 use crate::robot::fixture::{TAP_POSTURES, irb6640};
@@ -319,34 +320,75 @@ fn nothing_is_drawn_where_nothing_is_missing() {
     }
 }
 
+/// What tests of one place find in what the calibrated model leaves of `data`: one law, one resonance. Those that look everywhere find
+/// nothing.
+fn left_at_a_place(data: FrfData) -> [RestTest; 2] {
+    let bare = model();
+    let study = StructureStudy::new(data, Options::default());
+    let calibrated = study.calibrate(&bare).unwrap();
+    let rest = study.rest(&bare, &calibrated.theta).unwrap();
+    let (place, others): (Vec<RestTest>, Vec<RestTest>) = rest.tests.iter().partition(|t| t.is_of_a_place());
+    assert!(
+        !others.is_empty() && others.iter().all(|t| !t.is_significant()),
+        "{others:?}"
+    );
+    let place: [RestTest; 2] = place.try_into().unwrap();
+    assert_eq!(place.map(|t| t.looks_like), [LIKE_A_PLACE, LIKE_A_RESONANCE]);
+    place
+}
+
+fn measured_with(instance: Instance<Structure>, own: &[f64], seed: u64) -> FrfData {
+    let bare = model();
+    let data = measured(&bare, &[], seed);
+    measured(
+        &bare.with_effect(instance, &bare.known(&data.summary())),
+        own,
+        seed,
+    )
+}
+
 /// Far below what the tests see that look everywhere.
 #[test]
 fn a_law_at_one_place_is_seen_where_nothing_else_sees_it() {
-    let rest_of = |own: &[f64], seed| {
-        let bare = model();
-        let mut data = measured(&bare, &[], seed);
-        if !own.is_empty() {
-            let clamp = drawn::instance(Spot::ToolGround(2), DrawnForm::Spring);
-            data = measured(&bare.with_effect(clamp, &bare.known(&data.summary())), own, seed);
-        }
-        let study = StructureStudy::new(data, Options::default());
-        let calibrated = study.calibrate(&bare).unwrap();
-        let rest = study.rest(&bare, &calibrated.theta).unwrap();
-        let (place, others): (Vec<RestTest>, Vec<RestTest>) =
-            rest.tests.iter().partition(|t| t.looks_like == LIKE_A_PLACE);
-        assert!(
-            !others.is_empty() && others.iter().all(|t| !t.is_significant()),
-            "{others:?}"
-        );
-        place[0]
-    };
-    let faint = rest_of(&[1.2e3], 12);
+    let clamp = drawn::instance(Spot::ToolGround(2), DrawnForm::Spring);
+    let [faint, _] = left_at_a_place(measured_with(clamp, &[1.2e3], 12));
     assert!(faint.is_significant() && faint.sigmas() > 5.0, "{faint:?}");
     for seed in [21, 22, 23] {
-        let nothing = rest_of(&[], seed);
+        for nothing in left_at_a_place(measured(&model(), &[], seed)) {
+            assert!(
+                nothing.p_value > 1e-3 && nothing.sigmas().abs() < 3.5,
+                "{nothing:?}"
+            );
+        }
+    }
+}
+
+/// A law with one size for many lines does not see what changes its sign within them.
+#[test]
+fn a_faint_resonance_is_seen_at_its_frequency() {
+    const HZ: f64 = 27.0;
+    let bare = model();
+    let hung = Registry::structure().find(&bare.robot.spec, "local-resonator@link-3")[2];
+    let on_the_link = measured_with(hung, &[0.25, HZ, 0.04], 12);
+    // The ground of the sensor at the tool, the same at all postures.
+    let mut on_a_table = measured(&bare, &[], 13);
+    for block in &mut on_a_table.blocks {
+        let block = Arc::make_mut(block);
+        let own = |hz: f64| 2e-9 / Complex64::new(1.0 - (hz / HZ).powi(2), 0.06 * hz / HZ);
+        for frf in &mut block.frfs {
+            if (frf.response, frf.reference.axis) == (frf.reference, Axis::X) {
+                let lines = frf.receptance.iter_mut().zip(&block.frequency_hz);
+                lines.for_each(|(h, hz)| *h += own(*hz));
+            }
+        }
+    }
+    for data in [on_the_link, on_a_table] {
+        let [law, resonance] = left_at_a_place(data);
         assert!(
-            nothing.p_value > 1e-3 && nothing.sigmas().abs() < 3.5,
-            "{nothing:?}"
+            resonance.is_significant() && resonance.excess > 2.0 * law.excess,
+            "{resonance:?} {law:?}"
         );
+        let hz = resonance.frequency_hz.unwrap();
+        assert!((hz / HZ - 1.0).abs() < 0.03, "{hz}");
     }
 }

@@ -241,17 +241,20 @@ impl Study for StructureStudy {
     ) -> Result<Option<BeyondSlips>> {
         let Some(absorb) = self.slips else { return Ok(None) };
         let mut curves = model.rest(theta, &self.data)?;
-        let of_a_place = |test: &rest::RestTest| test.looks_like == rest::LIKE_A_PLACE;
-        let only_a_place = rest.tests.iter().all(|t| of_a_place(t) || !t.is_significant());
+        let only_a_place = rest
+            .tests
+            .iter()
+            .all(|t| t.is_of_a_place() || !t.is_significant());
         // Of a model that is far off (all files in other units, say) they cannot be told; nothing is lost by that.
         let Ok(after) = absorb(model, &self.data, theta, &curves) else {
             return Ok(None);
         };
         let price = after.price;
         let mut beyond = rest_patterns::test_beyond(&mut curves, after);
-        if only_a_place && let Some(mut test) = place_test::test(model, theta, &self.data, &curves)? {
-            test.excess += price;
-            beyond.tests.push(test);
+        if only_a_place {
+            let mut tests = place_test::test(model, theta, &self.data, &curves)?;
+            tests.iter_mut().for_each(|t| t.excess += price);
+            beyond.tests.extend(tests);
         }
         beyond.own_errors = self.own_errors(model, theta, &curves, &beyond)?;
         Ok(Some(beyond))
@@ -280,7 +283,8 @@ impl StructureStudy {
         else {
             return Ok(None);
         };
-        let place = place_test::test(model, theta, &self.data, curves)?;
+        let tests = place_test::test(model, theta, &self.data, curves)?;
+        let place = tests.iter().find(|t| t.looks_like == rest::LIKE_A_PLACE);
         Ok(place.map(|place| OwnErrors {
             common: common[0],
             common_std: common[1],

@@ -68,8 +68,12 @@ pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String 
             ),
         },
     };
-    if let Some(guess) = d.best_guess_in_words() {
-        text += &format!(" {guess}");
+    for words in d
+        .best_guess_in_words()
+        .into_iter()
+        .chain(d.unexplained_in_words())
+    {
+        text += &format!(" {words}");
     }
     if let Some(besides) = d.besides_in_words() {
         text += &format!(" {besides}.");

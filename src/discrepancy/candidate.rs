@@ -60,6 +60,15 @@ impl<D: Modelled> EffectCandidate<D> {
         }
     }
 
+    /// Effects of the model that choose otherwise beside it than in `effects`, those of the model as it stands.
+    pub fn chosen_anew(&self, effects: impl Iterator<Item = Instance<D>>) -> Vec<Instance<D>> {
+        let own = self.model.effects().iter().map(|added| added.instance);
+        own.zip(effects)
+            .filter(|(is, was)| is != was)
+            .map(|(is, _)| is)
+            .collect()
+    }
+
     /// Share of what stands above the noise that the effect explains, and its standard deviation; `None` for candidates that
     /// were not in question.
     pub fn explained_share(&self) -> Option<[f64; 2]> {

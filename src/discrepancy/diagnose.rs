@@ -19,9 +19,9 @@ use crate::identify::levenberg_marquardt::{Fit, Stopping, minimise};
 use crate::identify::model::Modelled;
 use crate::identify::rest::{BeyondSlips, Rest};
 use crate::identify::study::{
-    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, fit_as_a_model, fit_from, from_possible_size,
-    held_out, own_starts, paid, price_of_a_parameter, rescue, rounds_of_bases, try_again, try_effect,
-    try_effects, vanished,
+    Effort, Extent, InstanceOf, ModelOf, Study, Tried, View, exchanged, fit_as_a_model, fit_from,
+    from_possible_size, held_out, own_starts, paid, price_of_a_parameter, rescue, rounds_of_bases, try_again,
+    try_effect, try_effects, vanished,
 };
 use crate::progress::Progress;
 
@@ -231,8 +231,19 @@ impl<'a, S: Study> Engine<'a, S> {
         }
         let bases = (&coarse_base, &base, &base_rest);
         let (diagnosis, alone) = self.conclude(bases, &tried, &refined)?;
-        let Some(alone) = alone else { return Ok(diagnosis) };
-        self.put_choices_among(&mut refined, vec![alone]);
+        let better = match (alone, diagnosis.verdict) {
+            (Some(alone), _) => Some(alone),
+            (None, DiagnosisVerdict::Unknown) => {
+                let lowest = refined.iter().map(|t| t.fit.cost).fold(base.cost, f64::min);
+                self.with_another_choice(&base)?
+                    .filter(|t| t.fit.cost < lowest * (1.0 - BETTER))
+            }
+            (None, _) => None,
+        };
+        let Some(better) = better else {
+            return Ok(diagnosis);
+        };
+        self.put_choices_among(&mut refined, vec![better]);
         Ok(self.conclude(bases, &tried, &refined)?.0)
     }
 
@@ -367,8 +378,12 @@ impl<'a, S: Study> Engine<'a, S> {
                 indistinguishable: Vec::new(),
             };
         }
+        let effects = || model.effects().iter().map(|added| added.instance);
         let diagnosis = Diagnosis {
             too_little_data,
+            chosen_anew: decision
+                .effect
+                .map_or_else(Vec::new, |w| candidates[w].chosen_anew(effects())),
             verdict: decision.verdict,
             effect: decision.effect,
             best_guess: decision.best_guess,
@@ -656,6 +671,57 @@ impl<'a, S: Study> Engine<'a, S> {
             *best = other;
         }
         Ok(())
+    }
+
+    /// Of all effects, beside all other choices (a direction, a form) of those that are in the model already, the one that explains most: a
+    /// choice that was made while something was missing may hide it. `None` where there is no other choice.
+    fn with_another_choice(&self, base: &Fit) -> Result<Option<TriedOf<S>>> {
+        let places = self.model.effects().iter().enumerate();
+        let choices: Vec<(usize, InstanceOf<S>)> = places
+            .flat_map(|(place, added)| added.instance.other_choices().map(move |other| (place, other)))
+            .collect();
+        let models: Vec<(ModelOf<S>, Fit)> = choices
+            .par_iter()
+            .filter_map(|(place, other)| {
+                let (model, start) = exchanged(self.study, self.model, &base.theta, *place, other);
+                // All candidates are measured against one number of parameters in front of their own.
+                if start.len() != self.base_count {
+                    return None;
+                }
+                let fit = self.minimise(&model, View::COARSE, &start, REFINE).ok()?;
+                Some((model, fit))
+            })
+            .collect();
+        let each = models
+            .iter()
+            .flat_map(|model| self.instances.iter().map(move |instance| (model, instance)));
+        let mut looks: Vec<(&ModelOf<S>, TriedOf<S>)> = each
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .filter_map(|((model, fit), instance)| {
+                let bases = [fit.theta.clone()];
+                let look = try_effect(self.study, model, instance, &bases, &self.hints, Effort::Look)?;
+                Some((model, look))
+            })
+            .collect();
+        looks.sort_by(|a, b| a.1.fit.cost.total_cmp(&b.1.fit.cost));
+        looks.truncate(LEADERS);
+        let settled = looks.into_par_iter().filter_map(|(model, look)| {
+            fit_from(
+                self.study,
+                model,
+                &look.instance,
+                &look.fit.theta,
+                View::COARSE,
+                REFINE,
+            )
+            .ok()
+        });
+        let Some(best) = settled.min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)) else {
+            return Ok(None);
+        };
+        let fit = self.minimise(&best.model, View::FULL, &best.fit.theta, REFINE)?;
+        Ok(Some(Tried { fit, ..best }))
     }
 
     /// Where nothing explains the data: effects of the whole structure, and leaders, that have ended at sizes which cannot be, and those

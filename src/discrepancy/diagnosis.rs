@@ -2,6 +2,7 @@
 
 use super::candidate::{BaselineFit, EffectCandidate};
 use super::verdict::{DiagnosisVerdict, is_noise, leaves_noise};
+use crate::effects::Instance;
 use crate::identify::Modelled;
 
 /// The answer.
@@ -23,6 +24,8 @@ pub struct Diagnosis<D: Modelled> {
     pub indistinguishable: Vec<String>,
     /// The other effects, where several together explain what one alone does not.
     pub companions: Vec<String>,
+    /// Effects that are in the model and choose otherwise (a direction, a form) beside the missing one.
+    pub chosen_anew: Vec<Instance<D>>,
     /// The model as it stands.
     pub baseline: BaselineFit,
     /// Effects that this data cannot show, with the reason.
@@ -81,6 +84,18 @@ impl<D: Modelled> Diagnosis<D> {
             "{excuse} {} {explain}, less beside such errors.",
             crate::text::listed(&labels)
         ))
+    }
+
+    /// `Beside it local-resonator@link-3 (direction z) fits better than as it was`, where effects of the model choose otherwise beside the
+    /// missing one.
+    pub fn chosen_anew_in_words(&self) -> Option<String> {
+        let titles: Vec<String> = self.chosen_anew.iter().map(Instance::title).collect();
+        (!titles.is_empty()).then(|| {
+            format!(
+                "Beside it {} fits better than as it was; `lobestone add` changes that, too.",
+                crate::text::listed(&titles)
+            )
+        })
     }
 
     /// `A second effect is likely besides: payload`; `None` where one effect explains all.

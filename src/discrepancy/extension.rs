@@ -165,12 +165,7 @@ fn choose_anew<S: Study>(
     let mut theta = calibration.theta.clone();
     let mut cost = study.problem(model, View::FULL).cost(&theta)?;
     for place in 0..model.effects().len().saturating_sub(1) {
-        let known = model.effects()[place].instance;
-        let variants = known.effect.variants(known.site).into_iter();
-        let others: Vec<InstanceOf<S>> = variants
-            .filter(|variant| *variant != known.variant)
-            .map(|variant| Instance { variant, ..known })
-            .collect();
+        let others: Vec<InstanceOf<S>> = model.effects()[place].instance.other_choices().collect();
         let looks = others.into_par_iter().filter_map(|other| {
             let (model, start) = exchanged(study, model, &theta, place, &other);
             let fit = minimise(

@@ -144,6 +144,14 @@ impl<D: Domain> Instance<D> {
         }
     }
 
+    /// The same effect at the same place with each other discrete choice.
+    pub fn other_choices(&self) -> impl Iterator<Item = Self> + use<D> {
+        let known = *self;
+        let all = known.effect.variants(known.site).into_iter();
+        all.filter(move |variant| *variant != known.variant)
+            .map(move |variant| Instance { variant, ..known })
+    }
+
     /// What it is called.
     pub fn name(&self) -> EffectName {
         let variant = self.variant_label();

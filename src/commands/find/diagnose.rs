@@ -546,9 +546,12 @@ fn answer<D: Modelled>(d: &Diagnosis<D>) -> String {
     match (d.verdict, d.winner()) {
         (DiagnosisVerdict::Effect, Some(winner)) => {
             let effect = winner.instance.effect;
-            let left = d
+            let left: String = d
                 .excuse_in_words()
-                .map_or(String::new(), |excuse| wrapped(&excuse, "  "));
+                .into_iter()
+                .chain(d.chosen_anew_in_words())
+                .map(|words| wrapped(&words, "  "))
+                .collect();
             format!(
                 "{} ({sure})\n{}{}{left}",
                 Emphasis::Strong.on(format!("MISSING: {}", winner.label())),

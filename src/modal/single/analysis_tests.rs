@@ -365,6 +365,23 @@ fn overlap_is_told_and_an_answer_recommended() {
     assert!(remarks.iter().any(|r| r.contains("modes overlap")), "{remarks:?}");
 }
 
+/// A mode whose width lies between two lines has a frequency and no damping: that is said of it.
+#[test]
+fn a_width_that_the_lines_do_not_determine_is_told() {
+    let narrow = [
+        SyntheticMode::new(12.0, 0.02, 0.01),
+        SyntheticMode::new(30.013, 2e-5, 3e-5),
+    ];
+    let found = analyse(Synthetic::new(8.0, 40.0, 0.1, &narrow).with_noise(0.0002, 0.0, 4));
+    assert_eq!(rounded_hz(&found), [12.0, 30.0]);
+    let says = |m: &FrfMode| m.reason.contains("do not determine its width");
+    assert!(
+        !says(&found.modes[0]) && says(&found.modes[1]),
+        "{:?}",
+        found.modes
+    );
+}
+
 /// A mode on the flank of strong ones far away, of which no peak is in the lines: the residual is named, and half-power, which
 /// knows none, is off by what is said.
 #[test]

@@ -72,6 +72,7 @@ pub(crate) fn verdict_text<D: Modelled>(d: &Diagnosis<D>, data: &str) -> String 
         .best_guess_in_words()
         .into_iter()
         .chain(d.unexplained_in_words())
+        .chain(d.chosen_anew_in_words())
     {
         text += &format!(" {words}");
     }

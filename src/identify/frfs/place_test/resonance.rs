@@ -21,33 +21,88 @@ const ONE_LEVEL: f64 = 0.7;
 /// One resonance at one place.
 pub(super) struct Looked {
     hz: f64,
-    damping_ratio: f64,
-    /// Independent values of noise in all turns, for each unknown: lines hold no more than they are.
+    /// Index into [`DAMPING_RATIOS`].
+    damping: usize,
+    /// Independent values of noise in all late turns, for each unknown: lines hold no more than they are.
     independent: f64,
     /// Energy by turn.
     at: [f64; TURNS],
 }
 
+/// What noise puts into a pattern, and in how many independent values that was seen.
+#[derive(Clone, Copy)]
+struct Level {
+    energy: f64,
+    seen_in: f64,
+}
+
 impl Looked {
-    /// What noise leaves in the late turns of resonances nearby, all of one place, and in how many independent values that was seen.
-    fn noise(&self, place: &[Looked]) -> (f64, f64) {
-        let near =
-            |l: &&Looked| l.damping_ratio == self.damping_ratio && (l.hz / self.hz).ln().abs() < ONE_LEVEL;
-        let (mut sum, mut count, mut independent) = (0.0, 0.0, 0.0);
+    /// In its own late turns.
+    fn own(&self) -> Level {
+        let late = &self.at[1..];
+        Level {
+            energy: late.iter().sum::<f64>() / late.len() as f64,
+            seen_in: UNKNOWNS * self.independent,
+        }
+    }
+
+    /// In those of resonances nearby, all of one place, were it the same for all of them.
+    fn nearby(&self, place: &[Looked]) -> Level {
+        let near = |l: &&Looked| l.damping == self.damping && (l.hz / self.hz).ln().abs() < ONE_LEVEL;
+        let (mut energy, mut seen_in, mut count) = (0.0, 0.0, 0.0);
         let [mut low, mut high] = [self.hz; 2];
         for looked in place.iter().filter(near) {
-            sum += looked.at[1..].iter().sum::<f64>();
+            let own = looked.own();
+            energy += own.energy;
+            seen_in += own.seen_in;
             count += 1.0;
-            independent += looked.independent;
             (low, high) = (low.min(looked.hz), high.max(looked.hz));
         }
-        let apart = 1.0 + (high / low).ln() / independent_step(self.damping_ratio);
-        let late = (TURNS - 1) as f64;
-        (
-            sum / (count * late),
-            UNKNOWNS * independent / count * apart.min(count),
-        )
+        let apart = 1.0 + (high / low).ln() / independent_step(DAMPING_RATIOS[self.damping]);
+        Level {
+            energy: energy / count,
+            seen_in: seen_in / count * apart.min(count),
+        }
     }
+}
+
+/// Of each resonance, what noise puts into it: its own late turns know it too little, and those nearby need not have the same where the
+/// outputs of one hit share noise. Both together (an inverse gamma prior of the level, its width from how much the levels differ: Smyth
+/// 2004, eq. 3).
+fn levels(places: &[Vec<Looked>]) -> Vec<Vec<Level>> {
+    let nearby: Vec<Vec<Level>> = places
+        .iter()
+        .map(|place| place.iter().map(|looked| looked.nearby(place)).collect())
+        .collect();
+    let pairs = || {
+        places
+            .iter()
+            .zip(&nearby)
+            .flat_map(|(place, nearby)| place.iter().zip(nearby))
+    };
+    let differ: [f64; DAMPING_RATIOS.len()] = std::array::from_fn(|damping| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (looked, nearby) in pairs().filter(|(l, nearby)| l.damping == damping && nearby.energy > 0.0) {
+            let own = looked.own();
+            sum += (own.energy / nearby.energy - 1.0).powi(2) - 2.0 / own.seen_in;
+            count += 1.0;
+        }
+        sum / f64::max(count, 1.0)
+    });
+    let both = |looked: &Looked, nearby: &Level| {
+        let own = looked.own();
+        let weight = 2.0 / differ[looked.damping].max(2.0 / nearby.seen_in);
+        let seen_in = weight + own.seen_in;
+        Level {
+            energy: (weight * nearby.energy + own.seen_in * own.energy) / seen_in,
+            seen_in,
+        }
+    };
+    let of_place = |(place, nearby): (&Vec<Looked>, &Vec<Level>)| {
+        let each = place.iter().zip(nearby);
+        each.map(|(looked, nearby)| both(looked, nearby)).collect()
+    };
+    places.iter().zip(&nearby).map(of_place).collect()
 }
 
 /// Real and imaginary part of c.
@@ -62,7 +117,7 @@ fn independent_step(damping_ratio: f64) -> f64 {
 pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfModel) -> Vec<Looked> {
     let parameters = model.scores.nrows();
     let mut all = Vec::new();
-    for damping_ratio in DAMPING_RATIOS {
+    for (damping, damping_ratio) in DAMPING_RATIOS.into_iter().enumerate() {
         let within = |width: f64| (width / cells.ln_ratio).round() as usize;
         let (half, far) = (within(damping_ratio), within(HALF_WIDTHS * damping_ratio));
         let around = |cell: usize, by: usize| cell.saturating_sub(by)..(cell + by + 1).min(cells.count());
@@ -85,7 +140,7 @@ pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfMod
             if along.iter().all(|along| along.len() as f64 == UNKNOWNS) {
                 all.push(Looked {
                     hz,
-                    damping_ratio,
+                    damping,
                     independent: lines.min((TURNS - 1) as f64),
                     at,
                 });
@@ -107,11 +162,10 @@ pub(super) fn most_telling(
         FisherSnedecor::new(UNKNOWNS, known.recip()).ok()
     };
     let mut best: Option<(&Looked, f64, f64, FisherSnedecor)> = None;
-    for place in places {
-        for looked in place {
-            let (level, seen_in) = looked.noise(place);
-            let expected = factor * level;
-            let Some(law) = law(seen_in).filter(|_| expected > 0.0) else {
+    for (place, levels) in places.iter().zip(levels(places)) {
+        for (looked, level) in place.iter().zip(levels) {
+            let expected = factor * level.energy;
+            let Some(law) = law(level.seen_in).filter(|_| expected > 0.0) else {
                 continue;
             };
             let p = law.sf(looked.at[0] / expected);

@@ -232,3 +232,25 @@ fn a_choice_made_too_early_is_made_anew() {
     assert!(model["reduced_chi2"].as_f64().unwrap() < 1.1);
     assert_eq!(document(&["diagnose", path])["verdict"], "none");
 }
+
+/// Noise that the outputs of one hit share, on lines filled in by padding: it is not as large in all patterns, and its largest is no resonance.
+#[test]
+fn shared_noise_on_padded_lines_is_no_resonance() {
+    let found = diagnosed("--seed 7240001 --random control");
+    assert_eq!(found["verdict"], "none", "{}", found["rest"]);
+    let tests = found["rest"]["tests"].as_array().unwrap();
+    let resonance = tests.iter().find(|t| t["frequency_hz"].is_number()).unwrap();
+    assert!(resonance["p_value"].as_f64().unwrap() > 1e-3, "{resonance}");
+}
+
+/// A mode of the table under the sensor is no effect of the library: that something is there is said, and at which frequency.
+#[test]
+fn a_mode_of_the_table_is_told_with_its_frequency() {
+    let found = diagnosed("--seed 8400328 --random trial");
+    assert_eq!(found["verdict"], "unknown", "{}", found["rest"]);
+    let looks_like = found["rest"]["looks_like"].as_str().unwrap();
+    assert!(looks_like.starts_with("a resonance at one place"), "{looks_like}");
+    let tests = found["rest"]["tests"].as_array().unwrap();
+    let hz = tests.iter().find_map(|t| t["frequency_hz"].as_f64()).unwrap();
+    assert!((hz / 19.78 - 1.0).abs() < 0.02, "{hz}");
+}

@@ -233,7 +233,7 @@ pub(super) fn test(
             Energy::of(&bands, &of_model)
         })
         .collect();
-    let resonances: Vec<Vec<resonance::Looked>> = all
+    let resonances: Vec<Vec<resonance::TriedResonance>> = all
         .par_chunks(cells.count())
         .map(|place| resonance::look(place, &cells, data.blocks.len(), &of_model))
         .collect();

@@ -638,7 +638,7 @@ fn recommended(
     let error = |e: &ModeEstimate| e.damping_std.unwrap_or(f64::INFINITY);
     let percent = |e: &ModeEstimate| 100.0 * error(e) / e.damping_ratio;
     let local = &estimates[0];
-    if estimates.len() == 1 && error(local) >= local.damping_ratio {
+    if disturbance.is_none() && estimates.len() == 1 && error(local) >= local.damping_ratio {
         let reason = "for its frequency alone: these lines do not determine its width; it is a sine (hum, a disturbance), or damped too lightly for them";
         return (local.method, reason.into());
     }

@@ -19,7 +19,7 @@ const LINES_WITHIN: f64 = 3.0;
 const ONE_LEVEL: f64 = 0.7;
 
 /// One resonance at one place.
-pub(super) struct Looked {
+pub(super) struct TriedResonance {
     hz: f64,
     /// Index into [`DAMPING_RATIOS`].
     damping: usize,
@@ -36,7 +36,7 @@ struct Level {
     seen_in: f64,
 }
 
-impl Looked {
+impl TriedResonance {
     /// In its own late turns.
     fn own(&self) -> Level {
         let late = &self.at[1..];
@@ -47,8 +47,8 @@ impl Looked {
     }
 
     /// In those of resonances nearby, all of one place, were it the same for all of them.
-    fn nearby(&self, place: &[Looked]) -> Level {
-        let near = |l: &&Looked| l.damping == self.damping && (l.hz / self.hz).ln().abs() < ONE_LEVEL;
+    fn nearby(&self, place: &[TriedResonance]) -> Level {
+        let near = |l: &&TriedResonance| l.damping == self.damping && (l.hz / self.hz).ln().abs() < ONE_LEVEL;
         let (mut energy, mut seen_in, mut count) = (0.0, 0.0, 0.0);
         let [mut low, mut high] = [self.hz; 2];
         for looked in place.iter().filter(near) {
@@ -69,7 +69,7 @@ impl Looked {
 /// Of each resonance, what noise puts into it: its own late turns know it too little, and those nearby need not have the same where the
 /// outputs of one hit share noise. Both together (an inverse gamma prior of the level, its width from how much the levels differ: Smyth
 /// 2004, eq. 3).
-fn levels(places: &[Vec<Looked>]) -> Vec<Vec<Level>> {
+fn levels(places: &[Vec<TriedResonance>]) -> Vec<Vec<Level>> {
     let nearby: Vec<Vec<Level>> = places
         .iter()
         .map(|place| place.iter().map(|looked| looked.nearby(place)).collect())
@@ -89,7 +89,7 @@ fn levels(places: &[Vec<Looked>]) -> Vec<Vec<Level>> {
         }
         sum / f64::max(count, 1.0)
     });
-    let both = |looked: &Looked, nearby: &Level| {
+    let both = |looked: &TriedResonance, nearby: &Level| {
         let own = looked.own();
         let weight = 2.0 / differ[looked.damping].max(2.0 / nearby.seen_in);
         let seen_in = weight + own.seen_in;
@@ -98,7 +98,7 @@ fn levels(places: &[Vec<Looked>]) -> Vec<Vec<Level>> {
             seen_in,
         }
     };
-    let of_place = |(place, nearby): (&Vec<Looked>, &Vec<Level>)| {
+    let of_place = |(place, nearby): (&Vec<TriedResonance>, &Vec<Level>)| {
         let each = place.iter().zip(nearby);
         each.map(|(looked, nearby)| both(looked, nearby)).collect()
     };
@@ -114,7 +114,7 @@ fn independent_step(damping_ratio: f64) -> f64 {
 }
 
 /// Looks at every other cell for a resonance at one place, `cells` being what is seen there, over so many `postures`.
-pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfModel) -> Vec<Looked> {
+pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfModel) -> Vec<TriedResonance> {
     let parameters = model.scores.nrows();
     let mut all = Vec::new();
     for (damping, damping_ratio) in DAMPING_RATIOS.into_iter().enumerate() {
@@ -138,7 +138,7 @@ pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfMod
                 .zip(&along)
                 .for_each(|(energy, along)| *energy = along.norm_squared());
             if along.iter().all(|along| along.len() as f64 == UNKNOWNS) {
-                all.push(Looked {
+                all.push(TriedResonance {
                     hz,
                     damping,
                     independent: lines.min((TURNS - 1) as f64),
@@ -153,7 +153,7 @@ pub(super) fn look(place: &[Seen], cells: &Cells, postures: usize, model: &OfMod
 /// The resonance whose energy is least likely to be noise, as one of all that were looked at; `colour`: noise unturned over
 /// noise at the late turns, and its relative standard deviation.
 pub(super) fn most_telling(
-    places: &[Vec<Looked>],
+    places: &[Vec<TriedResonance>],
     cells: &Cells,
     [factor, unsure]: [f64; 2],
 ) -> Option<RestTest> {
@@ -161,7 +161,7 @@ pub(super) fn most_telling(
         let known = seen_in.recip() + 0.5 * unsure * unsure;
         FisherSnedecor::new(UNKNOWNS, known.recip()).ok()
     };
-    let mut best: Option<(&Looked, f64, f64, FisherSnedecor)> = None;
+    let mut best: Option<(&TriedResonance, f64, f64, FisherSnedecor)> = None;
     for (place, levels) in places.iter().zip(levels(places)) {
         for (looked, level) in place.iter().zip(levels) {
             let expected = factor * level.energy;

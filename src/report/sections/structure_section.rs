@@ -78,7 +78,7 @@ fn verdict(findings: &StructureFindings) -> String {
     });
     if total <= NOISE_LIKE {
         let mut text = String::from(
-            "What is left is as large as the noise: taken together, these FRFs show nothing that the model lacks.",
+            "What is left is as large as the noise: by its size alone it shows nothing that the model lacks.",
         );
         if let Some((band, ratio, b)) = band_text
             && times(b.nrms, b.noise_floor_nrms) > 1.5
